@@ -1,0 +1,9 @@
+//! BLE Unwrap: automatic UV unwrapping by Bernoulli logistic embedding.
+#![forbid(unsafe_code)]
+
+pub mod distortion;
+pub mod geodesics;
+pub mod mesh;
+mod progress;
+
+pub use progress::{Cancelled, Progress, Stage};

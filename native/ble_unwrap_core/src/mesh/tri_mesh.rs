@@ -1,0 +1,426 @@
+//! The oriented manifold triangle mesh that every stage works on.
+
+use nalgebra::Point3;
+
+use super::groups::Groups;
+use super::index::{FaceId, HalfedgeId, VertexId};
+
+/// An oriented triangle mesh, manifold by construction, in three flat arrays.
+///
+/// The corner *is* the half-edge: half-edge `3·f + k` leaves corner `k` of face `f` towards
+/// corner `k + 1`. `twin` holds the opposite half-edge, or [`HalfedgeId::NONE`] on a boundary.
+///
+/// Guaranteed (see [`TriMesh::check_invariants`]): twins are mutual and opposed; the corners of a
+/// vertex form one fan, so there is no bow-tie; every vertex is used by a face.
+///
+/// Not guaranteed: being connected, having a boundary, positive areas, distinct positions.
+#[derive(Clone, Debug, Default)]
+pub struct TriMesh {
+    positions: Vec<Point3<f64>>,
+    triangles: Vec<[VertexId; 3]>,
+    twin: Vec<HalfedgeId>,
+    /// An outgoing half-edge of each vertex; on the boundary the one without a twin.
+    outgoing: Vec<HalfedgeId>,
+}
+
+/// Counts of the cells of a mesh, and what follows from them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Topology {
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Number of edges, an edge and its twin counted once.
+    pub edges: usize,
+    /// Number of faces.
+    pub faces: usize,
+    /// Number of boundary loops.
+    pub loops: usize,
+    /// Number of edge-connected components.
+    pub components: usize,
+}
+
+impl Topology {
+    /// Euler characteristic V − E + F.
+    #[must_use]
+    pub fn euler(&self) -> i64 {
+        self.vertices as i64 - self.edges as i64 + self.faces as i64
+    }
+
+    /// Genus summed over the components: (2C − L − χ) / 2.
+    #[must_use]
+    pub fn genus(&self) -> usize {
+        let twice = 2 * self.components as i64 - self.loops as i64 - self.euler();
+        debug_assert!(twice >= 0 && twice % 2 == 0, "not an oriented manifold: {self:?}");
+        usize::try_from(twice / 2).unwrap_or(0)
+    }
+
+    /// Whether the mesh can be a chart: connected, genus 0, with a boundary.
+    #[must_use]
+    pub fn is_chart(&self) -> bool {
+        self.components == 1 && self.loops >= 1 && self.genus() == 0
+    }
+
+    /// Whether the mesh is a topological disk.
+    #[must_use]
+    pub fn is_disk(&self) -> bool {
+        self.is_chart() && self.loops == 1
+    }
+}
+
+impl TriMesh {
+    /// Builds a mesh from glued triangles; the vertices are the fans of corners that gluing makes.
+    ///
+    /// `corner_source[h]` names the point a corner lies at, `position(source)` gives its
+    /// coordinates, `twin[h]` the opposite half-edge or [`HalfedgeId::NONE`]. Returns the mesh and
+    /// the source of each vertex. Two fans at one source become two vertices: this is how
+    /// bow-ties, cuts and sub-meshes with pinched vertices come out manifold. O(n).
+    ///
+    /// # Panics
+    /// If the arrays differ in length or the length is no multiple of three.
+    #[must_use]
+    pub fn from_glued(
+        corner_source: &[u32],
+        twin: Vec<HalfedgeId>,
+        position: impl Fn(u32) -> Point3<f64>,
+    ) -> (Self, Vec<u32>) {
+        assert_eq!(corner_source.len(), twin.len(), "one twin a corner");
+        assert_eq!(twin.len() % 3, 0, "three corners a triangle");
+        let mut corner_vertex = vec![VertexId::NONE; twin.len()];
+        let mut source = Vec::new();
+        let mut outgoing = Vec::new();
+        for seed in 0..twin.len() {
+            if !corner_vertex[seed].is_none() {
+                continue;
+            }
+            // Turn clockwise to the first corner of the fan (or once around a closed fan).
+            let seed = HalfedgeId::new(seed);
+            let mut first = seed;
+            loop {
+                let across = twin[first.index()];
+                if across.is_none() {
+                    break;
+                }
+                first = across.next();
+                if first == seed {
+                    break;
+                }
+            }
+            let vertex = VertexId::new(source.len());
+            source.push(corner_source[seed.index()]);
+            outgoing.push(first);
+            let mut h = first;
+            loop {
+                corner_vertex[h.index()] = vertex;
+                let across = twin[h.prev().index()];
+                if across.is_none() || across == first {
+                    break;
+                }
+                h = across;
+            }
+        }
+        let positions = source.iter().map(|&s| position(s)).collect();
+        let triangles = corner_vertex.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
+        (Self { positions, triangles, twin, outgoing }, source)
+    }
+
+    /// Builds a mesh from vertex indices, gluing every pair of opposed half-edges.
+    ///
+    /// Half-edges that occur twice in the same direction, and edges with more than two faces, stay
+    /// unglued. Unused positions vanish and bow-ties split, so vertex numbers may differ from the
+    /// input; the second value gives the source of each vertex. Meant for clean meshes and tests;
+    /// [`condition`](super::condition()) accepts anything.
+    #[must_use]
+    pub fn from_triangles(positions: &[Point3<f64>], triangles: &[[u32; 3]]) -> (Self, Vec<u32>) {
+        let corners: Vec<u32> = triangles.iter().flatten().copied().collect();
+        let end = |h: usize| corners[HalfedgeId::new(h).next().index()];
+        let mut keys: Vec<(u32, u32, usize)> =
+            (0..corners.len()).map(|h| (corners[h].min(end(h)), corners[h].max(end(h)), h)).collect();
+        keys.sort_unstable();
+        let mut twin = vec![HalfedgeId::NONE; corners.len()];
+        for group in keys.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            if let [(_, _, a), (_, _, b)] = *group
+                && corners[a] == end(b)
+                && corners[b] == end(a)
+            {
+                twin[a] = HalfedgeId::new(b);
+                twin[b] = HalfedgeId::new(a);
+            }
+        }
+        Self::from_glued(&corners, twin, |s| positions[s as usize])
+    }
+
+    /// The part of the mesh made of `faces` (in this order), cut along every edge for which
+    /// `is_cut` holds (asked once a side). Returns it with the source of each vertex; face `i` of
+    /// the part is `faces[i]`. O(|faces|) plus one flat array over all faces.
+    #[must_use]
+    pub fn submesh(&self, faces: &[FaceId], is_cut: impl Fn(HalfedgeId) -> bool) -> (Self, Vec<VertexId>) {
+        let mut local = vec![u32::MAX; self.face_count()];
+        for (i, f) in faces.iter().enumerate() {
+            local[f.index()] = FaceId::new(i).index() as u32;
+        }
+        let mut corner_source = Vec::with_capacity(3 * faces.len());
+        let mut twin = Vec::with_capacity(3 * faces.len());
+        for &f in faces {
+            for h in f.halfedges() {
+                corner_source.push(self.from(h).index() as u32);
+                let t = self.twin(h);
+                let glued = !t.is_none() && local[t.face().index()] != u32::MAX && !is_cut(h) && !is_cut(t);
+                twin.push(if glued {
+                    FaceId::new(local[t.face().index()] as usize).halfedge(t.slot())
+                } else {
+                    HalfedgeId::NONE
+                });
+            }
+        }
+        let (mesh, source) = Self::from_glued(&corner_source, twin, |s| self.positions[s as usize]);
+        (mesh, source.into_iter().map(|s| VertexId::new(s as usize)).collect())
+    }
+
+    /// Number of vertices.
+    #[inline]
+    #[must_use]
+    pub fn vertex_count(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Number of triangles.
+    #[inline]
+    #[must_use]
+    pub fn face_count(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// Number of half-edges: three a triangle.
+    #[inline]
+    #[must_use]
+    pub fn halfedge_count(&self) -> usize {
+        self.twin.len()
+    }
+
+    /// All vertices in order.
+    pub fn vertices(&self) -> impl ExactSizeIterator<Item = VertexId> + Clone + use<> {
+        (0..self.vertex_count()).map(VertexId::new)
+    }
+
+    /// All faces in order.
+    pub fn faces(&self) -> impl ExactSizeIterator<Item = FaceId> + Clone + use<> {
+        (0..self.face_count()).map(FaceId::new)
+    }
+
+    /// All half-edges in order.
+    pub fn halfedges(&self) -> impl ExactSizeIterator<Item = HalfedgeId> + Clone + use<> {
+        (0..self.halfedge_count()).map(HalfedgeId::new)
+    }
+
+    /// Each edge once: boundary half-edges, and of a twin pair the one of lower index.
+    pub fn edges(&self) -> impl Iterator<Item = HalfedgeId> + '_ {
+        self.halfedges().filter(|&h| self.twin(h).is_none() || h < self.twin(h))
+    }
+
+    /// Coordinates of a vertex.
+    #[inline]
+    #[must_use]
+    pub fn position(&self, v: VertexId) -> Point3<f64> {
+        self.positions[v.index()]
+    }
+
+    /// Coordinates of all vertices.
+    #[inline]
+    #[must_use]
+    pub fn positions(&self) -> &[Point3<f64>] {
+        &self.positions
+    }
+
+    /// The corners of all triangles.
+    #[inline]
+    #[must_use]
+    pub fn triangles(&self) -> &[[VertexId; 3]] {
+        &self.triangles
+    }
+
+    /// The corners of a triangle.
+    #[inline]
+    #[must_use]
+    pub fn triangle(&self, f: FaceId) -> [VertexId; 3] {
+        self.triangles[f.index()]
+    }
+
+    /// The corner positions of a triangle.
+    #[inline]
+    #[must_use]
+    pub fn triangle_positions(&self, f: FaceId) -> [Point3<f64>; 3] {
+        self.triangle(f).map(|v| self.position(v))
+    }
+
+    /// The vertex a half-edge leaves.
+    #[inline]
+    #[must_use]
+    pub fn from(&self, h: HalfedgeId) -> VertexId {
+        self.triangles[h.face().index()][h.slot()]
+    }
+
+    /// The vertex a half-edge points to.
+    #[inline]
+    #[must_use]
+    pub fn to(&self, h: HalfedgeId) -> VertexId {
+        self.from(h.next())
+    }
+
+    /// The opposite half-edge, or [`HalfedgeId::NONE`] on a boundary.
+    #[inline]
+    #[must_use]
+    pub fn twin(&self, h: HalfedgeId) -> HalfedgeId {
+        self.twin[h.index()]
+    }
+
+    /// Whether no face lies on the other side.
+    #[inline]
+    #[must_use]
+    pub fn is_boundary(&self, h: HalfedgeId) -> bool {
+        self.twin(h).is_none()
+    }
+
+    /// Whether a vertex lies on a boundary loop.
+    #[inline]
+    #[must_use]
+    pub fn is_boundary_vertex(&self, v: VertexId) -> bool {
+        self.is_boundary(self.outgoing[v.index()])
+    }
+
+    /// Length of an edge.
+    #[inline]
+    #[must_use]
+    pub fn edge_length(&self, h: HalfedgeId) -> f64 {
+        (self.position(self.to(h)) - self.position(self.from(h))).norm()
+    }
+
+    /// The half-edges that leave `v`, counter-clockwise; on a boundary from the half-edge without a
+    /// twin. The neighbours of `v` are their ends and, on a boundary, the start of the last one's
+    /// [`prev`](HalfedgeId::prev).
+    pub fn outgoing(&self, v: VertexId) -> impl Iterator<Item = HalfedgeId> + '_ {
+        let first = self.outgoing[v.index()];
+        let mut current = first;
+        std::iter::from_fn(move || {
+            if current.is_none() {
+                return None;
+            }
+            let h = current;
+            current = self.twin(h.prev());
+            if current == first {
+                current = HalfedgeId::NONE;
+            }
+            Some(h)
+        })
+    }
+
+    /// The vertices joined to `v` by an edge, counter-clockwise.
+    pub fn neighbours(&self, v: VertexId) -> impl Iterator<Item = VertexId> + '_ {
+        self.outgoing(v).flat_map(move |h| {
+            let last = self.is_boundary(h.prev()).then(|| self.from(h.prev()));
+            std::iter::once(self.to(h)).chain(last)
+        })
+    }
+
+    /// The boundary half-edge that follows boundary half-edge `h` along its loop.
+    #[inline]
+    #[must_use]
+    pub fn next_boundary(&self, h: HalfedgeId) -> HalfedgeId {
+        self.outgoing[self.to(h).index()]
+    }
+
+    /// The boundary loops, each as half-edges in order with the surface on their left; sorted by
+    /// lowest half-edge.
+    #[must_use]
+    pub fn boundary_loops(&self) -> Groups<HalfedgeId> {
+        let mut seen = vec![false; self.halfedge_count()];
+        let mut loops = Groups::new();
+        for first in self.halfedges() {
+            if !self.is_boundary(first) || seen[first.index()] {
+                continue;
+            }
+            let mut h = first;
+            while !seen[h.index()] {
+                seen[h.index()] = true;
+                loops.push(h);
+                h = self.next_boundary(h);
+            }
+            loops.close();
+        }
+        loops
+    }
+
+    /// A component label for each face, and the number of components; faces are joined over edges.
+    /// Labels ascend with the lowest face.
+    #[must_use]
+    pub fn components(&self) -> (Vec<u32>, usize) {
+        let mut label = vec![u32::MAX; self.face_count()];
+        let mut count = 0;
+        let mut stack = Vec::new();
+        for seed in self.faces() {
+            if label[seed.index()] != u32::MAX {
+                continue;
+            }
+            label[seed.index()] = count;
+            stack.push(seed);
+            while let Some(f) = stack.pop() {
+                for h in f.halfedges() {
+                    let t = self.twin(h);
+                    if !t.is_none() && label[t.face().index()] == u32::MAX {
+                        label[t.face().index()] = count;
+                        stack.push(t.face());
+                    }
+                }
+            }
+            count += 1;
+        }
+        (label, count as usize)
+    }
+
+    /// Cell counts, boundary loops and components.
+    #[must_use]
+    pub fn topology(&self) -> Topology {
+        let boundary = self.twin.iter().filter(|t| t.is_none()).count();
+        Topology {
+            vertices: self.vertex_count(),
+            edges: (self.halfedge_count() + boundary) / 2,
+            faces: self.face_count(),
+            loops: self.boundary_loops().len(),
+            components: self.components().1,
+        }
+    }
+
+    /// Checks every promise of the type and names the first one broken. For tests; O(n).
+    ///
+    /// # Errors
+    /// A sentence that names the offending element.
+    pub fn check_invariants(&self) -> Result<(), String> {
+        if self.twin.len() != 3 * self.triangles.len() || self.outgoing.len() != self.positions.len() {
+            return Err("array lengths disagree".into());
+        }
+        for h in self.halfedges() {
+            let t = self.twin(h);
+            if t.is_none() {
+                continue;
+            }
+            if t.index() >= self.halfedge_count() || self.twin(t) != h || t == h {
+                return Err(format!("{h} and {t} are not each other's twin"));
+            }
+            if self.from(h) != self.to(t) || self.to(h) != self.from(t) {
+                return Err(format!("twins {h} and {t} do not run against each other"));
+            }
+        }
+        let mut used = vec![0usize; self.vertex_count()];
+        for v in self.triangles.iter().flatten() {
+            if v.index() >= used.len() {
+                return Err(format!("a triangle names {v}, which is not there"));
+            }
+            used[v.index()] += 1;
+        }
+        for v in self.vertices() {
+            let fan = self.outgoing(v).take(used[v.index()] + 1).filter(|&h| self.from(h) == v).count();
+            if fan != used[v.index()] || fan == 0 {
+                return Err(format!("{v} has {} corners, its fan {fan}", used[v.index()]));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,154 @@
+//! One shared object by which another thread watches a computation and asks it to stop.
+
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
+
+use thiserror::Error;
+
+/// The computation was asked to stop and did; nothing was produced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("cancelled")]
+pub struct Cancelled;
+
+/// What the pipeline is doing, in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Stage {
+    /// Not started.
+    Waiting = 0,
+    /// Checking the input and building the manifold mesh.
+    Condition,
+    /// Cutting the surface into charts and flattening them; by far the longest.
+    Charts,
+    /// Placing the charts in the unit square.
+    Pack,
+    /// Exact checks and the report.
+    Verify,
+    /// Finished.
+    Done,
+}
+
+impl Stage {
+    const ALL: [Self; 6] = [Self::Waiting, Self::Condition, Self::Charts, Self::Pack, Self::Verify, Self::Done];
+
+    /// A word for a status line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Waiting => "waiting",
+            Self::Condition => "reading mesh",
+            Self::Charts => "making charts",
+            Self::Pack => "packing",
+            Self::Verify => "checking",
+            Self::Done => "done",
+        }
+    }
+
+    /// Share of the whole done when the stage begins; measured on meshes of 10,000 to 100,000 faces.
+    fn begin(self) -> f64 {
+        match self {
+            Self::Waiting | Self::Condition => 0.0,
+            Self::Charts => 0.02,
+            Self::Pack => 0.85,
+            Self::Verify => 0.97,
+            Self::Done => 1.0,
+        }
+    }
+}
+
+/// Cancel flag and progress of one computation. Share it by reference or `Arc`; every method may be
+/// called from any thread at any time.
+///
+/// [`Progress::fraction`] only rises. Cancelling is cooperative: the computation looks at the flag
+/// at least every few milliseconds of work per thread.
+#[derive(Debug, Default)]
+pub struct Progress {
+    cancelled: AtomicBool,
+    stage: AtomicU8,
+    /// The fraction as the bits of a non-negative f64, whose order is that of the integers.
+    fraction: AtomicU64,
+}
+
+impl Progress {
+    /// A computation that has not started.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Asks the computation to stop. It returns [`Cancelled`] soon after.
+    pub fn cancel(&self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether [`Progress::cancel`] was called.
+    #[must_use]
+    pub fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+
+    /// Fails once cancelled: stages write `progress.check()?` in their loops.
+    ///
+    /// # Errors
+    /// [`Cancelled`] after [`Progress::cancel`].
+    pub fn check(&self) -> Result<(), Cancelled> {
+        if self.is_cancelled() { Err(Cancelled) } else { Ok(()) }
+    }
+
+    /// The current stage.
+    #[must_use]
+    pub fn stage(&self) -> Stage {
+        Stage::ALL[usize::from(self.stage.load(Ordering::Relaxed)).min(Stage::ALL.len() - 1)]
+    }
+
+    /// Share of the work done, from 0 to 1; never falls.
+    #[must_use]
+    pub fn fraction(&self) -> f64 {
+        f64::from_bits(self.fraction.load(Ordering::Relaxed))
+    }
+
+    /// Enters a stage. For the pipeline.
+    pub fn enter(&self, stage: Stage) {
+        self.stage.store(stage as u8, Ordering::Relaxed);
+        self.raise(stage.begin());
+    }
+
+    /// Reports that `share` (0 to 1) of `stage` is done. For the pipeline.
+    pub fn advance(&self, stage: Stage, share: f64) {
+        let end = Stage::ALL[(stage as usize + 1).min(Stage::ALL.len() - 1)].begin();
+        self.raise(stage.begin() + (end - stage.begin()) * share.clamp(0.0, 1.0));
+    }
+
+    fn raise(&self, fraction: f64) {
+        self.fraction.fetch_max(fraction.to_bits(), Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fraction_rises_from_zero_to_one() {
+        let p = Progress::new();
+        let mut last = p.fraction();
+        assert_eq!(last, 0.0);
+        for stage in Stage::ALL {
+            p.enter(stage);
+            for share in [0.0, 0.7, 0.3, 1.0] {
+                p.advance(stage, share);
+                assert!(p.fraction() >= last);
+                last = p.fraction();
+            }
+        }
+        assert_eq!(last, 1.0);
+        assert_eq!(p.stage(), Stage::Done);
+    }
+
+    #[test]
+    fn check_fails_after_cancel() {
+        let p = Progress::new();
+        assert_eq!(p.check(), Ok(()));
+        p.cancel();
+        assert_eq!(p.check(), Err(Cancelled));
+    }
+}
