@@ -5,6 +5,8 @@
 mod groups;
 mod index;
 pub mod measure;
+#[cfg(test)]
+pub(crate) mod test_surfaces;
 mod tri_mesh;
 
 pub use groups::Groups;
