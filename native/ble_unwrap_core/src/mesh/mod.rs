@@ -11,6 +11,8 @@ mod index;
 mod input;
 pub mod measure;
 mod orient;
+#[cfg(test)]
+pub(crate) mod test_surfaces;
 mod tri_mesh;
 mod triangulate;
 mod weld;
