@@ -4,6 +4,7 @@
 pub mod distortion;
 pub mod geodesics;
 pub mod mesh;
+pub mod packing;
 mod progress;
 
 pub use progress::{Cancelled, Progress, Stage};
