@@ -3,6 +3,7 @@
 
 pub mod distortion;
 pub mod geodesics;
+pub mod linalg;
 pub mod mesh;
 mod progress;
 
