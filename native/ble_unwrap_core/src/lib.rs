@@ -6,5 +6,6 @@ pub mod geodesics;
 pub mod linalg;
 pub mod mesh;
 mod progress;
+pub mod stretch;
 
 pub use progress::{Cancelled, Progress, Stage};
