@@ -3,9 +3,11 @@
 
 pub mod distortion;
 pub mod geodesics;
+pub mod linalg;
 pub mod mesh;
 pub mod metrics;
 pub mod packing;
 mod progress;
+pub mod stretch;
 
 pub use progress::{Cancelled, Progress, Stage};
