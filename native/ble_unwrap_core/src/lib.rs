@@ -6,5 +6,10 @@ pub mod geodesics;
 pub mod mesh;
 pub mod metrics;
 mod progress;
+mod report;
+pub mod rounding;
+mod verify;
 
 pub use progress::{Cancelled, Progress, Stage};
+pub use report::Report;
+pub use verify::{Certificate, Defect, verify};
