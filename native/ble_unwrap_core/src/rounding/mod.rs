@@ -129,7 +129,7 @@ impl Mender<'_> {
         for f in faces {
             let [a, b, c] = self.mesh.triangle(f).map(|v| self.at(v));
             let area = double_area(a, b, c);
-            if !(area > 0.0) {
+            if !is_positive(area) {
                 turned.push(f);
             } else if area < f64::from(self.goal[f.index()]) * longest_edge(a, b, c) {
                 thin.push(f);
@@ -245,7 +245,7 @@ impl Mender<'_> {
         let mut score = Score { turned: 0, least: 1.0, distance: 0.0 };
         for o in star {
             let area = double_area(x, o.p, o.q);
-            score.turned += usize::from(!(area > 0.0));
+            score.turned += usize::from(!is_positive(area));
             if o.constraint.want > 0.0 {
                 score.least = score.least.min(area / o.constraint.want);
             }
@@ -296,6 +296,11 @@ fn step(x: f32, by: i32) -> f32 {
 fn double_area(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> f64 {
     let coord = |p: [f32; 2]| Coord { x: f64::from(p[0]), y: f64::from(p[1]) };
     orient2d(coord(a), coord(b), coord(c))
+}
+
+/// Whether an area makes a triangle; NaN does not.
+fn is_positive(area: f64) -> bool {
+    area > 0.0
 }
 
 fn longest_edge(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> f64 {
