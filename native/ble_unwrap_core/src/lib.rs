@@ -9,5 +9,10 @@ pub mod metrics;
 pub mod packing;
 mod progress;
 pub mod stretch;
+mod report;
+pub mod rounding;
+mod verify;
 
 pub use progress::{Cancelled, Progress, Stage};
+pub use report::Report;
+pub use verify::{Certificate, Defect, verify};
