@@ -2,7 +2,9 @@
 #![forbid(unsafe_code)]
 
 pub mod distortion;
+pub mod embedding;
 pub mod geodesics;
+pub mod linalg;
 pub mod mesh;
 mod progress;
 
