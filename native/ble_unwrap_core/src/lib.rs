@@ -5,5 +5,6 @@ pub mod distortion;
 pub mod geodesics;
 pub mod mesh;
 mod progress;
+pub mod segmentation;
 
 pub use progress::{Cancelled, Progress, Stage};
