@@ -35,6 +35,7 @@ pub mod segmentation;
 mod settings;
 pub mod stretch;
 mod verify;
+pub mod segmentation;
 
 pub use error::UnwrapError;
 pub use mesh::{MeshError, MeshInput};

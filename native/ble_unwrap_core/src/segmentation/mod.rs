@@ -101,3 +101,8 @@ fn finish(graph: &PolygonGraph, mut label: Vec<u32>) -> Segmentation {
     }
     Segmentation { label: graph.of_face.iter().map(|&p| label[p as usize]).collect(), parts }
 }
+//! Where a surface is cut into charts.
+
+mod min_cut;
+
+pub use min_cut::CutGraph;
