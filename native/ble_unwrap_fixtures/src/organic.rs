@@ -97,17 +97,17 @@ const CREATURE_SLOPE: f64 = 1.6;
 pub fn sculpt_like(target_faces: usize) -> PolyMesh {
     const EXTENT: f64 = 1.7;
     const TRIAL: f64 = 0.07;
-    const ATTEMPTS: usize = 10;
+    const ATTEMPTS: usize = 16;
+    const SHIFT: f64 = 0.137;
     let trial = surface_net(EXTENT, TRIAL, CREATURE_SLOPE, creature).faces.len();
-    let mut cell = TRIAL * (trial as f64 / target_faces as f64).sqrt();
-    let mut mesh = surface_net(EXTENT, cell, CREATURE_SLOPE, creature);
-    // Once in a while two sheets of the net meet in one cell; a slightly other grid parts them.
-    for _ in 0..ATTEMPTS {
+    let cell = TRIAL * (trial as f64 / target_faces as f64).sqrt();
+    let mut mesh = PolyMesh::default();
+    // Once in a while two sheets of the net meet in one cell; a shifted grid parts them.
+    for attempt in 0..ATTEMPTS {
+        mesh = surface_net(EXTENT + SHIFT * attempt as f64 * cell, cell, CREATURE_SLOPE, creature);
         if is_manifold(&mesh) {
             break;
         }
-        cell *= 0.99;
-        mesh = surface_net(EXTENT, cell, CREATURE_SLOPE, creature);
     }
     mesh
 }
