@@ -92,7 +92,7 @@ impl Surface {
 /// nowhere else. Most area of each component keeps its input winding. Faces with a non-finite
 /// vertex are left out and listed. A mesh without faces gives an empty surface.
 ///
-/// O(n log n); deterministic. DESIGN, stage S0.
+/// O(n log n); deterministic, whatever the number of threads.
 ///
 /// # Errors
 /// [`MeshError`] names the first element that makes the arrays meaningless, or is
