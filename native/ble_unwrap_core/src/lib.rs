@@ -35,7 +35,6 @@ pub mod segmentation;
 mod settings;
 pub mod stretch;
 mod verify;
-pub mod segmentation;
 
 pub use error::UnwrapError;
 pub use mesh::{MeshError, MeshInput};

@@ -9,7 +9,7 @@ use crate::linalg::{Mds, classical_mds};
 use crate::mesh::{TriMesh, measure};
 use crate::progress::{Cancelled, Progress};
 
-use super::min_cut::CutGraph;
+use super::CutGraph;
 use super::polygon_graph::PolygonGraph;
 
 /// Capacities are integers, so that the cut does not depend on the order of sums; a side of mean
