@@ -82,6 +82,11 @@ impl Shared {
 }
 
 impl Job {
+    /// The job of a call: the one its caller gave, or a new one.
+    pub(crate) fn given_or_new<'py>(py: Python<'py>, given: Option<Bound<'py, Self>>) -> PyResult<Bound<'py, Self>> {
+        given.map_or_else(|| Bound::new(py, Self::new()), Ok)
+    }
+
     /// Runs `work` on a thread of its own; `deliver` makes the Python object of its output.
     ///
     /// `threads` limits the parallelism of the work, 0 leaves it to the machine. A panic in `work`
