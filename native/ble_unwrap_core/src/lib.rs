@@ -4,6 +4,8 @@
 pub mod distortion;
 pub mod geodesics;
 pub mod mesh;
+pub mod metrics;
+pub mod packing;
 mod progress;
 
 pub use progress::{Cancelled, Progress, Stage};
