@@ -7,5 +7,6 @@ pub mod mesh;
 pub mod metrics;
 pub mod packing;
 mod progress;
+pub mod standalone;
 
 pub use progress::{Cancelled, Progress, Stage};
