@@ -221,13 +221,14 @@ impl FaceMeasures {
         let (e1, e2) = (p[1] - p[0], p[2] - p[0]);
         let double_area = e1.cross(&e2).norm();
         let longest = e1.norm().max(e2.norm()).max((p[2] - p[1]).norm());
-        // Written so that NaN is degenerate.
-        let degenerate = !(double_area > DEGENERATE * longest);
+        // NaN is degenerate.
+        let solid = double_area > DEGENERATE * longest;
         let sub = |a: [f64; 2], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
         let (d1, d2, d3) = (sub(uv[1], uv[0]), sub(uv[2], uv[0]), sub(uv[2], uv[1]));
         let det = d1[0] * d2[1] - d1[1] * d2[0];
         let mapped = !det.is_nan();
         let uv_longest = d1[0].hypot(d1[1]).max(d2[0].hypot(d2[1])).max(d3[0].hypot(d3[1]));
+        let uv_solid = det.abs() > DEGENERATE * extent * uv_longest;
         let su = (e1 * d2[1] - e2 * d1[1]) / det;
         let sv = (e2 * d1[0] - e1 * d2[0]) / det;
         let (a, b, c) = (su.norm_squared(), su.dot(&sv), sv.norm_squared());
@@ -236,9 +237,9 @@ impl FaceMeasures {
         let smaller = double_area / det.abs() / larger;
         Self {
             area: if double_area.is_finite() { 0.5 * double_area } else { 0.0 },
-            degenerate,
+            degenerate: !solid,
             uv_double_area: if mapped { det } else { 0.0 },
-            uv_degenerate: mapped && !(det.abs() > DEGENERATE * extent * uv_longest),
+            uv_degenerate: mapped && !uv_solid,
             mapped,
             singular: [larger, smaller],
             squared_norm: a + c,
@@ -331,15 +332,14 @@ fn stretch(out: &mut Measures, mesh: &UvMesh, faces: &[FaceMeasures], topology: 
             l2: l2(s),
         })
         .collect();
-    if !(all.area > 0.0) {
+    if all.area == 0.0 {
         return;
     }
     let density = all.uv_area / all.area;
     out.l2 = l2(&all);
     out.l2_chart_scale = chart.iter().map(|s| (s.energy * s.uv_area).sqrt()).sum::<f64>() / all.area;
     for c in out.per_chart.iter().filter(|c| c.area_share > SPECK) {
-        // NaN loses to the first number.
-        if !(c.l2 <= out.l2_worst_chart) {
+        if out.l2_worst_chart.is_nan() || c.l2 > out.l2_worst_chart {
             out.l2_worst_chart = c.l2;
             out.worst_chart = Some(c.label);
         }

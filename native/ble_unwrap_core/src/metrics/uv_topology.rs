@@ -13,8 +13,6 @@ pub(crate) const NONE: u32 = u32::MAX;
 /// one *chart* if they share a mesh edge with the same UV vertices at both ends; charts that share a
 /// UV vertex are one *island*.
 pub(crate) struct UvTopology {
-    /// UV vertices of each triangle; [`NONE`] where it has no finite UV.
-    pub(crate) uv_vertex: Vec<[u32; 3]>,
     /// Chart of each triangle, numbered by lowest triangle; [`NONE`] where it has no finite UV.
     pub(crate) chart: Vec<u32>,
     pub(crate) chart_count: usize,
@@ -101,7 +99,7 @@ impl UvTopology {
         let mut island = vec![NONE; m];
         let island_count = number(m, mapped, |f| by_vertex.find(uv_vertex[f][0] as usize).0, &mut island);
         let boundary = (0..3 * m as u32).filter(|&h| is_boundary[h as usize]).collect();
-        Self { uv_vertex, chart, chart_count, against, island, island_count, boundary, seam_length, nonfinite }
+        Self { chart, chart_count, against, island, island_count, boundary, seam_length, nonfinite }
     }
 }
 

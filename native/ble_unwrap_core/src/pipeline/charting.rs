@@ -1,5 +1,7 @@
 //! Surface to charts: flatten a patch, accept the chart or split the patch, until all are charts.
 
+use std::cell::OnceCell;
+
 use rayon::prelude::*;
 
 use crate::charts::{self, Chart, Patch};
@@ -9,7 +11,7 @@ use crate::progress::{Cancelled, Progress, Stage};
 use crate::segmentation::{self, SpectralAnalysis};
 use crate::settings::{Holes, Settings};
 
-use super::flatten::{self, Flat};
+use super::flatten;
 use super::rungs::{Rung, Rungs};
 
 /// Patches less planar than this are split before any flattening: a cap of 90° has 0.85, and an
@@ -77,34 +79,34 @@ pub(super) fn chart(patches: Vec<Patch>, settings: &Settings, progress: &Progres
     Ok(Charting { charts, family, rungs })
 }
 
-/// Flattens a patch as it is or with the cuts its topology needs; `None` where the chart would not be
-/// under the limit (never `None` with `must`).
+/// Flattens a patch as it is or with the cuts its topology needs; `None` where no such chart would be
+/// under the limit.
 pub(super) fn try_chart(
     patch: &Patch,
-    must: bool,
     settings: &Settings,
     rungs: &mut Rungs,
     progress: &Progress,
 ) -> Result<Option<Chart>, Cancelled> {
-    Attempt::new(patch, progress)?.run(must, settings, rungs, progress)
+    Attempt::new(patch, settings, progress).run(rungs)
 }
 
 fn step(piece: &Piece, settings: &Settings, progress: &Progress) -> Result<(Step, Rungs), Cancelled> {
     progress.check()?;
     let (patch, splits) = (&piece.patch, piece.splits);
     let mut rungs = Rungs::default();
-    let whole = patch.is_one_polygon();
-    let attempt = Attempt::new(patch, progress)?;
-    let chart = attempt.run(whole, settings, &mut rungs, progress)?;
-    if let Some(chart) = chart {
+    let attempt = Attempt::new(patch, settings, progress);
+    if patch.is_one_polygon() {
+        let chart = attempt.polygon(&mut rungs)?;
+        return Ok((Step::Accept(Box::new(chart)), rungs));
+    }
+    if let Some(chart) = attempt.run(&mut rungs)? {
         return Ok((Step::Accept(Box::new(chart)), rungs));
     }
     let parts = if splits < MOST_SPECTRAL_SPLITS {
         rungs.take(Rung::Split);
-        let (distances, analysis) = attempt.analysis(settings, progress)?;
-        let first = splits == 0;
+        let (distances, analysis) = attempt.analysis()?;
         let cuts = &settings.segmentation;
-        segmentation::segment(&patch.mesh, &patch.polygon, &distances, &analysis, first, cuts, progress)?
+        segmentation::segment(&patch.mesh, &patch.polygon, distances, analysis, splits == 0, cuts, progress)?
     } else {
         rungs.take(Rung::Bisect);
         segmentation::bisect(&patch.mesh, &patch.polygon)
@@ -116,82 +118,70 @@ fn step(piece: &Piece, settings: &Settings, progress: &Progress) -> Result<(Step
 struct Attempt<'a> {
     patch: &'a Patch,
     topology: Topology,
-    measured: std::cell::OnceCell<(LandmarkDistances, SpectralAnalysis)>,
+    settings: &'a Settings,
+    progress: &'a Progress,
+    measured: OnceCell<(LandmarkDistances, SpectralAnalysis)>,
 }
 
 impl<'a> Attempt<'a> {
-    fn new(patch: &'a Patch, progress: &Progress) -> Result<Self, Cancelled> {
-        progress.check()?;
-        Ok(Self { patch, topology: patch.mesh.topology(), measured: std::cell::OnceCell::new() })
+    fn new(patch: &'a Patch, settings: &'a Settings, progress: &'a Progress) -> Self {
+        Self { patch, topology: patch.mesh.topology(), settings, progress, measured: OnceCell::new() }
     }
 
-    fn analysis(
-        &self,
-        settings: &Settings,
-        progress: &Progress,
-    ) -> Result<(LandmarkDistances, SpectralAnalysis), Cancelled> {
+    fn analysis(&self) -> Result<&(LandmarkDistances, SpectralAnalysis), Cancelled> {
         if let Some(known) = self.measured.get() {
-            return Ok(known.clone());
+            return Ok(known);
         }
-        let fresh = analyse(self.patch, settings, progress)?;
-        Ok(self.measured.get_or_init(|| fresh).clone())
+        let fresh = analyse(self.patch, self.settings, self.progress)?;
+        Ok(self.measured.get_or_init(|| fresh))
     }
 
-    /// From the cheapest way to the dearest; see the ladder in [`Rung`].
-    fn run(
-        &self,
-        must: bool,
-        settings: &Settings,
-        rungs: &mut Rungs,
-        progress: &Progress,
-    ) -> Result<Option<Chart>, Cancelled> {
-        let patch = self.patch;
-        let chartable = self.topology.is_chart();
-        let disk_wanted = settings.holes == Holes::Cut && self.topology.loops > 1;
-        if chartable && !disk_wanted {
-            if let Some(flat) = flatten::isometric(patch, rungs) {
-                return Ok(Some(flat.into_chart(patch.clone())));
+    /// A chart whatever its stretch, for a patch that cannot be split.
+    fn polygon(&self, rungs: &mut Rungs) -> Result<Chart, Cancelled> {
+        let flat = match flatten::isometric(self.patch, rungs) {
+            Some(flat) => flat,
+            None => flatten::flatten_polygon(self.patch, &self.analysis()?.0, self.settings, rungs, self.progress)?,
+        };
+        Ok(flat.into_chart(self.patch.clone()))
+    }
+
+    /// As it is if its topology allows, else, or if that does not do, cut open to a disk.
+    fn run(&self, rungs: &mut Rungs) -> Result<Option<Chart>, Cancelled> {
+        let as_it_is = self.topology.is_disk() || (self.topology.is_chart() && self.settings.holes == Holes::Keep);
+        if as_it_is {
+            if let Some(flat) = flatten::isometric(self.patch, rungs) {
+                return Ok(Some(flat.into_chart(self.patch.clone())));
             }
-            let (distances, analysis) = self.analysis(settings, progress)?;
-            if must || analysis.planarity >= LEAST_PLANARITY {
-                let flat = flatten::flatten(patch, &distances, must, settings, rungs, progress)?;
+            let (distances, analysis) = self.analysis()?;
+            if analysis.planarity >= LEAST_PLANARITY {
+                let flat = flatten::flatten(self.patch, distances, self.settings, rungs, self.progress)?;
                 if let Some(flat) = flat {
-                    return Ok(Some(flat.into_chart(patch.clone())));
+                    return Ok(Some(flat.into_chart(self.patch.clone())));
                 }
             }
         }
-        if (self.topology.is_disk() && !must) || patch.faces.len() < LEAST_FACES_TO_CUT && !must {
+        // A closed blob does not flatten from one cut, and a few faces are not worth one.
+        let blob = self.topology.loops == 0 && self.topology.genus() == 0;
+        if self.topology.is_disk() || blob || self.patch.faces.len() < LEAST_FACES_TO_CUT {
             return Ok(None);
         }
-        self.run_cut(must, settings, rungs, progress)
+        self.run_cut(rungs)
     }
 
     /// Opens handles and joins holes to the outside, then flattens the disk that is left.
-    fn run_cut(
-        &self,
-        must: bool,
-        settings: &Settings,
-        rungs: &mut Rungs,
-        progress: &Progress,
-    ) -> Result<Option<Chart>, Cancelled> {
-        if self.topology.loops == 0 && self.topology.genus() == 0 && !must {
-            // A closed blob never flattens from one cut.
-            return Ok(None);
-        }
-        let patch = self.patch;
-        let edges: Vec<HalfedgeId> = charts::cut_to_disk(&patch.mesh, |h| patch.is_diagonal(h));
-        let disk = patch.cut(&edges);
-        debug_assert!(disk.mesh.topology().is_disk(), "cut open: {:?}", disk.mesh.topology());
+    fn run_cut(&self, rungs: &mut Rungs) -> Result<Option<Chart>, Cancelled> {
+        let edges: Vec<HalfedgeId> = charts::cut_to_disk(&self.patch.mesh, |h| self.patch.is_diagonal(h));
+        let disk = self.patch.cut(&edges);
         rungs.take(Rung::CutOpen);
         if let Some(flat) = flatten::isometric(&disk, rungs) {
             return Ok(Some(flat.into_chart(disk)));
         }
-        let (distances, analysis) = analyse(&disk, settings, progress)?;
-        if !must && analysis.planarity < LEAST_PLANARITY {
+        let (distances, analysis) = analyse(&disk, self.settings, self.progress)?;
+        if analysis.planarity < LEAST_PLANARITY {
             return Ok(None);
         }
-        let flat: Option<Flat> = flatten::flatten(&disk, &distances, must, settings, rungs, progress)?;
-        Ok(flat.map(|f| f.into_chart(disk)))
+        let flat = flatten::flatten(&disk, &distances, self.settings, rungs, self.progress)?;
+        Ok(flat.map(|flat| flat.into_chart(disk)))
     }
 }
 

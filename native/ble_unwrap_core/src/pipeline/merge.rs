@@ -67,7 +67,7 @@ pub(super) fn merge(
             .map(|&(a, b)| {
                 let mut rungs = Rungs::default();
                 let union = union(mesh, polygon, &pool, a, b);
-                Ok((charting::try_chart(&union, false, settings, &mut rungs, progress)?, rungs))
+                Ok((charting::try_chart(&union, settings, &mut rungs, progress)?, rungs))
             })
             .collect();
         for (&(a, b), test) in pairs.iter().zip(tests) {
