@@ -24,6 +24,7 @@ test-python: $(VENV)/.wheel
 	$(BIN)/python -m pytest tests --ignore=tests/blender
 
 test-blender: zip
+	.ci/blender_libraries
 	$(PYTHON) .ci/test_blender
 
 lint: $(VENV)/.ready
@@ -43,13 +44,14 @@ zip: wheel
 	$(BIN)/python .ci/build_extension
 
 demo: zip
+	.ci/blender_libraries
 	$(PYTHON) .ci/demo $(MESH)
 
 bench:
 	$(CARGO) bench -p ble_unwrap_core
 
 clean:
-	rm -rf target out $(VENV) .venv-bpy* $(WHEELS)/*.whl $(WHEELS)/.built
+	rm -rf target out .cache $(VENV) $(WHEELS)/*.whl $(WHEELS)/.built
 
 $(VENV)/.ready: .ci/requirements.txt
 	PYTHON="$(PYTHON)" .ci/make_venv $(VENV) -r .ci/requirements.txt

@@ -53,9 +53,12 @@ class _EmbeddingSettings(_Threads, total=False):
     initial: Literal["mds", "random"]
 
 @type_check_only
-class _PackSettings(_Threads, total=False):
+class _MeasureSettings(_Threads, total=False):
     margin: float
     texture_size: int | tuple[int, int]
+
+@type_check_only
+class _PackSettings(_MeasureSettings, total=False):
     rotation: Literal["any", "quarter", "none"]
 
 @type_check_only
@@ -93,6 +96,8 @@ class Atlas:
 class Embedding:
     @property
     def coordinates(self) -> Array: ...
+    @property
+    def intercepts(self) -> Array: ...
     @property
     def report(self) -> dict[str, Any]: ...
 
@@ -161,10 +166,8 @@ def measure(
     *,
     chart: Buffer | None = None,
     corner_triangles: Buffer | None = None,
-    texture_size: int | tuple[int, int] = 2048,
-    margin: float = 4.0,
-    threads: int = 0,
     job: Job | None = None,
+    **settings: Unpack[_MeasureSettings],
 ) -> dict[str, Any]: ...
 def pack(
     points: Buffer,

@@ -28,6 +28,13 @@ pub(crate) fn real_rows<const N: usize>(object: &Bound<'_, PyAny>, argument: Arg
     collect_rows(&view, |at| view.real(at))
 }
 
+/// Rows of `N` real numbers rounded to float32, from float32 or float64 of shape (n, `N`).
+pub(crate) fn single_rows<const N: usize>(object: &Bound<'_, PyAny>, argument: Argument) -> PyResult<Vec<[f32; N]>> {
+    let view = View::new(object, argument, REALS)?;
+    view.expect_columns(N)?;
+    collect_rows(&view, |at| view.real(at).map(|x| x as f32))
+}
+
 /// A row-major matrix of real numbers with its row and column counts, from float32 or float64 of shape (n, m).
 pub(crate) fn real_matrix(object: &Bound<'_, PyAny>, argument: Argument) -> PyResult<(Vec<f64>, usize, usize)> {
     let view = View::new(object, argument, REALS)?;

@@ -113,7 +113,7 @@ impl Job {
                 shared.progress.check().map_err(Failure::from)?;
                 with_threads(threads, || work(&shared.progress))
             }));
-            let outcome = outcome.unwrap_or_else(|panic| Err(Failure::Panic(panic_text(&*panic))));
+            let outcome = outcome.unwrap_or_else(|panic| Err(Failure::panic(&panic_text(&*panic))));
             if outcome.is_ok() {
                 shared.progress.enter(Stage::Done);
             }
@@ -125,7 +125,7 @@ impl Job {
         };
         let spawned = std::thread::Builder::new().name("ble_unwrap".into()).stack_size(STACK_BYTES).spawn(run);
         if let Err(error) = spawned {
-            *self.shared.lock() = State::Failed(Failure::Threads(error.to_string()));
+            *self.shared.lock() = State::Failed(Failure::threads(&error));
         }
         Ok(())
     }
@@ -168,7 +168,7 @@ impl Job {
         drop(state);
         let (next, outcome) = match delivery(py) {
             Ok(object) => (State::Delivered(object.clone_ref(py)), Ok(object)),
-            Err(error) => (State::Failed(Failure::Delivery(error.to_string())), Err(error)),
+            Err(error) => (State::Failed(Failure::delivery(&error)), Err(error)),
         };
         *self.shared.lock() = next;
         self.shared.finished.notify_all();
@@ -180,8 +180,7 @@ impl Job {
 impl Job {
     #[new]
     fn new() -> Self {
-        let shared =
-            Shared { progress: Progress::new(), state: Mutex::new(State::Idle), finished: Condvar::new() };
+        let shared = Shared { progress: Progress::new(), state: Mutex::new(State::Idle), finished: Condvar::new() };
         Self { shared: Arc::new(shared) }
     }
 
@@ -297,7 +296,7 @@ fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T, Failur
         .num_threads(threads)
         .thread_name(|i| format!("ble_unwrap_{i}"))
         .build()
-        .map_err(|error| Failure::Threads(error.to_string()))?;
+        .map_err(|error| Failure::threads(&error))?;
     pool.install(work)
 }
 

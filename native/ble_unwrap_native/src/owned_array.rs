@@ -87,13 +87,13 @@ impl Array {
     }
 
     /// Takes a row-major float32 matrix.
-    pub(crate) fn from_f32_matrix(values: Vec<f32>, rows: usize, columns: usize) -> Self {
-        Self::new(Elements::F32(values), &[rows, columns])
+    pub(crate) fn from_f32_matrix(values: Vec<f32>, shape: [usize; 2]) -> Self {
+        Self::new(Elements::F32(values), &shape)
     }
 
     /// Takes a row-major float64 matrix.
-    pub(crate) fn from_f64_matrix(values: Vec<f64>, rows: usize, columns: usize) -> Self {
-        Self::new(Elements::F64(values), &[rows, columns])
+    pub(crate) fn from_f64_matrix(values: Vec<f64>, shape: [usize; 2]) -> Self {
+        Self::new(Elements::F64(values), &shape)
     }
 
     /// Takes float64 values: shape (n,).
@@ -163,8 +163,7 @@ impl Array {
                 std::ptr::null_mut()
             };
             (*view).ndim = if asks(ffi::PyBUF_ND) { array.shape.len() as c_int } else { 1 };
-            (*view).shape =
-                if asks(ffi::PyBUF_ND) { array.shape.as_ptr().cast_mut() } else { std::ptr::null_mut() };
+            (*view).shape = if asks(ffi::PyBUF_ND) { array.shape.as_ptr().cast_mut() } else { std::ptr::null_mut() };
             (*view).strides =
                 if asks(ffi::PyBUF_STRIDES) { array.strides.as_ptr().cast_mut() } else { std::ptr::null_mut() };
             (*view).suboffsets = std::ptr::null_mut();

@@ -2,6 +2,7 @@
 //! defaults and error messages all come from it.
 
 use ble_unwrap_core::Settings;
+use ble_unwrap_core::packing::PackSettings;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyString};
 
@@ -41,6 +42,7 @@ pub(crate) enum Function {
     Unwrap,
     Embed,
     GeodesicDistances,
+    Measure,
     Pack,
 }
 
@@ -50,6 +52,7 @@ impl Function {
             Self::Unwrap => "unwrap",
             Self::Embed => "embed",
             Self::GeodesicDistances => "geodesic_distances",
+            Self::Measure => "measure",
             Self::Pack => "pack",
         }
     }
@@ -113,15 +116,15 @@ impl Interval {
 
 /// Most threads one call may ask for: several times the largest machines, far below what exhausts one.
 const MOST_THREADS: usize = 1024;
-/// Largest texture side that the packer's bit masks hold in reasonable memory: 32 MiB a mask.
-const MOST_TEXELS: u32 = 16384;
+/// Largest texture side the packer takes.
+const MOST_TEXELS: u32 = PackSettings::LARGEST_SIZE;
 
 const UNWRAP: &[Function] = &[];
 const EMBED: &[Function] = &[Function::Embed];
 const GEODESICS: &[Function] = &[Function::GeodesicDistances];
 const PACK: &[Function] = &[Function::Pack];
-const SEEDED: &[Function] = &[Function::Embed];
-const ALL: &[Function] = &[Function::Embed, Function::GeodesicDistances, Function::Pack];
+const TEXTURE: &[Function] = &[Function::Measure, Function::Pack];
+const ALL: &[Function] = &[Function::Embed, Function::GeodesicDistances, Function::Measure, Function::Pack];
 
 #[rustfmt::skip] // a table: one row a setting
 const TABLE: &[Setting] = &[
@@ -130,7 +133,7 @@ const TABLE: &[Setting] = &[
     row("merge", Field::Flag(|c| &mut c.settings.merge), UNWRAP),
     row("holes", Field::Word(|c| &mut c.settings.holes), UNWRAP),
     row("chart_scale", Field::Word(|c| &mut c.settings.chart_scale), UNWRAP),
-    row("seed", Field::Seed(|c| &mut c.settings.seed), SEEDED),
+    row("seed", Field::Seed(|c| &mut c.settings.seed), EMBED),
     row("geodesics", Field::Word(|c| &mut c.settings.geodesics.metric), GEODESICS),
     row("landmark_fraction", Field::Real(|c| &mut c.settings.geodesics.landmark_fraction, Interval::above(0.0, 1.0)), UNWRAP),
     row("landmark_min", Field::Whole(|c| &mut c.settings.geodesics.landmark_min, [4, 100_000]), UNWRAP),
@@ -144,8 +147,8 @@ const TABLE: &[Setting] = &[
     row("initial", Field::Word(|c| &mut c.settings.embedding.initial), EMBED),
     row("stretch_solver", Field::Word(|c| &mut c.settings.stretch.solver), UNWRAP),
     row("stretch_iterations", Field::Whole(|c| &mut c.settings.stretch.max_iterations, [1, 100_000]), UNWRAP),
-    row("margin", Field::Real(|c| &mut c.settings.packing.margin_texels, Interval::closed(0.0, 1024.0)), PACK),
-    row("texture_size", Field::Size(|c| [&mut c.settings.packing.width, &mut c.settings.packing.height], [16, MOST_TEXELS]), PACK),
+    row("margin", Field::Real(|c| &mut c.settings.packing.margin_texels, Interval::closed(0.0, 1024.0)), TEXTURE),
+    row("texture_size", Field::Size(|c| [&mut c.settings.packing.width, &mut c.settings.packing.height], [1, MOST_TEXELS]), TEXTURE),
     row("rotation", Field::Word(|c| &mut c.settings.packing.rotation), PACK),
     row("threads", Field::Whole(|c| &mut c.threads, [0, MOST_THREADS]), ALL),
 ];
@@ -277,7 +280,7 @@ where
     found.ok_or_else(|| refusal(name, &format!("a whole number from {least} to {most}{unit}"), value))
 }
 
-fn set_word(name: &str, target: &mut dyn Words, value: &Bound<'_, PyAny>) -> PyResult<()> {
+pub(crate) fn set_word(name: &str, target: &mut dyn Words, value: &Bound<'_, PyAny>) -> PyResult<()> {
     let known = value.extract::<String>().is_ok_and(|word| target.set(&word));
     if known { Ok(()) } else { Err(refusal(name, &crate::words::listed(&target.words()), value)) }
 }

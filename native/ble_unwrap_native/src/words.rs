@@ -6,6 +6,7 @@ use ble_unwrap_core::packing::Rotation;
 use ble_unwrap_core::stretch::Solver;
 use ble_unwrap_core::{ChartScale, Holes};
 
+use crate::embed::DataKind;
 use crate::settings::Preset;
 
 /// A choice that has a word for each of its values.
@@ -42,6 +43,7 @@ macro_rules! words {
     };
 }
 
+words!(DataKind { "points" => Points, "distances" => Distances, "affinities" => Affinities });
 words!(Preset { "default" => Default, "paper" => Paper });
 words!(Holes { "keep" => Keep, "cut" => Cut });
 words!(ChartScale { "uniform" => Uniform, "stretch" => Stretch });

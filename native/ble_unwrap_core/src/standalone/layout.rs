@@ -37,14 +37,24 @@ pub enum LayoutError {
     Cancelled(#[from] Cancelled),
 }
 
+/// The figures of a UV map of polygons.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LayoutMeasures {
+    /// Number of faces.
+    pub faces: usize,
+    /// Faces that have a negative chart, a corner whose UV is not finite, or a vertex that is not.
+    pub unmapped_faces: usize,
+    /// The figures of the triangulated faces, those with a non-finite vertex left out.
+    pub measures: Measures,
+}
+
 /// Measures a UV map, whoever made it: one UV a corner in `uv`, and in `chart`, if given, a number a face
 /// that is negative for faces without UVs.
 ///
 /// Faces are triangulated as [`unwrap`](crate::unwrap()) does it (with `input.corner_triangles` where they cover
-/// a face) and measured as [`metrics::measure`] says; counts are of triangles, except
-/// [`Measures::unmapped_faces`], which includes each face with a non-finite vertex as one. Charts are
-/// found from the UVs; `chart` only tells which faces have any. Vertices are not welded: a mesh that is
-/// split along its seams has no seams left. O(n log n).
+/// a face) and measured as [`metrics::measure`] says. Charts are found from the UVs; `chart` only tells
+/// which faces have any. Vertices are not welded: a mesh that is split along its seams has no seams left.
+/// O(n log n).
 ///
 /// # Errors
 /// [`LayoutError`]: invalid arrays, wrong lengths, cancelled.
@@ -54,7 +64,7 @@ pub fn measure_layout(
     chart: Option<&[i32]>,
     texture: Texture,
     progress: &Progress,
-) -> Result<Measures, LayoutError> {
+) -> Result<LayoutMeasures, LayoutError> {
     progress.check()?;
     progress.enter(Stage::Condition);
     let corners = input.corner_vertices.len();
@@ -74,9 +84,16 @@ pub fn measure_layout(
         chart.map(|chart| surface.polygon.iter().map(|&p| chart[p as usize]).collect()).unwrap_or_default();
     progress.enter(Stage::Verify);
     let mesh = UvMesh::new(&positions, &triangles, uv, &corner_triangles, &label, texture)?;
-    let mut measures = metrics::measure(&mesh, progress)?;
-    measures.unmapped_faces += surface.unmapped.len();
-    Ok(measures)
+    let measures = metrics::measure(&mesh, progress)?;
+    let mut mapped = vec![true; faces];
+    for &p in &surface.unmapped {
+        mapped[p as usize] = false;
+    }
+    for (p, mapped) in mapped.iter_mut().enumerate() {
+        let corners = input.face_offsets[p] as usize..input.face_offsets[p + 1] as usize;
+        *mapped &= chart.is_none_or(|chart| chart[p] >= 0) && uv[corners].iter().flatten().all(|x| x.is_finite());
+    }
+    Ok(LayoutMeasures { faces, unmapped_faces: mapped.iter().filter(|mapped| !**mapped).count(), measures })
 }
 
 #[cfg(test)]
@@ -106,7 +123,7 @@ mod tests {
         [0.0, 0.0],
     ];
 
-    fn measured(uv: &[[f32; 2]], chart: Option<&[i32]>) -> Result<Measures, LayoutError> {
+    fn measured(uv: &[[f32; 2]], chart: Option<&[i32]>) -> Result<LayoutMeasures, LayoutError> {
         let input = MeshInput {
             positions: &POSITIONS,
             corner_vertices: &[0, 1, 2, 3, 1, 4, 5, 2, 0, 1, 6],
@@ -119,8 +136,10 @@ mod tests {
     #[test]
     fn two_faithful_squares_of_a_strip() {
         for chart in [None, Some([0, 1, -1].as_slice())] {
-            let m = measured(&UV, chart).expect("a valid layout");
-            assert_eq!((m.charts, m.faces, m.unmapped_faces, m.flips, m.overlaps), (2, 4, 1, 0, 0));
+            let layout = measured(&UV, chart).expect("a valid layout");
+            assert_eq!((layout.faces, layout.unmapped_faces), (3, 1));
+            let m = layout.measures;
+            assert_eq!((m.charts, m.faces, m.flips, m.overlaps), (2, 4, 0, 0));
             assert!((m.l2 - 1.0).abs() < 1e-6 && (m.packing_efficiency - 0.08).abs() < 1e-6, "{m:?}");
             assert!((m.seam_length_absolute - 2.0).abs() < 1e-9, "{m:?}");
             assert!((m.gap_texels - 8.0).abs() < 1e-4, "beyond the search limit: {m:?}");
@@ -129,8 +148,12 @@ mod tests {
 
     #[test]
     fn a_chart_below_zero_has_no_uv() {
-        let m = measured(&UV, Some(&[0, -1, -1])).expect("a valid layout");
-        assert_eq!((m.charts, m.unmapped_faces), (1, 3));
+        let mut uv = UV;
+        uv[5][1] = f32::NAN;
+        for (uv, chart) in [(&UV, [0, -1, -1]), (&uv, [0, 1, 2])] {
+            let layout = measured(uv, Some(&chart)).expect("a valid layout");
+            assert_eq!((layout.measures.charts, layout.unmapped_faces), (chart[1].max(0) as usize + 1, 2));
+        }
     }
 
     #[test]

@@ -7,5 +7,5 @@ mod layout;
 mod repack;
 
 pub use distances::{DistancesError, surface_distances};
-pub use layout::{LayoutError, measure_layout};
+pub use layout::{LayoutError, LayoutMeasures, measure_layout};
 pub use repack::{RepackError, Repacked, repack};
