@@ -29,6 +29,8 @@ pub mod metrics;
 pub mod packing;
 mod pipeline;
 mod progress;
+pub mod standalone;
+pub mod stretch;
 mod report;
 pub mod rounding;
 pub mod segmentation;
