@@ -4,6 +4,8 @@
 
 mod classical_mds;
 mod symmetric;
+mod vector_state;
 
 pub use classical_mds::{Mds, classical_mds};
 pub use symmetric::{EigenError, Eigenpairs, leading_eigenpairs};
+pub use vector_state::restore_vector_state;
