@@ -261,9 +261,7 @@ fn pair_count(n: usize) -> f64 {
 fn check_square(matrix: &[f64], n: usize) -> Result<(), EmbeddingError> {
     match n.checked_mul(n) {
         Some(expected) if expected == matrix.len() => Ok(()),
-        expected => {
-            Err(EmbeddingError::WrongLength { expected: expected.unwrap_or(usize::MAX), found: matrix.len() })
-        }
+        expected => Err(EmbeddingError::WrongLength { expected: expected.unwrap_or(usize::MAX), found: matrix.len() }),
     }
 }
 

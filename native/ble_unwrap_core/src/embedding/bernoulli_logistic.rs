@@ -82,7 +82,7 @@ impl FitOptions {
             let expected = "above 0 and below 2";
             return Err(EmbeddingError::InvalidSetting { name: "relaxation", value: self.relaxation, expected });
         }
-        if !(self.tolerance >= 0.0) {
+        if self.tolerance.is_nan() || self.tolerance < 0.0 {
             return Err(EmbeddingError::InvalidSetting {
                 name: "tolerance",
                 value: self.tolerance,
@@ -204,16 +204,12 @@ fn relax<B: Blocks>(
     progress: &Progress,
 ) -> Result<Outcome, Cancelled> {
     match (options.model, options.update) {
-        (LogitModel::WithIntercepts, Update::Serial) => {
-            serial::<B, Tight>(blocks, p, dimensions, options, progress)
-        }
+        (LogitModel::WithIntercepts, Update::Serial) => serial::<B, Tight>(blocks, p, dimensions, options, progress),
         (LogitModel::WithIntercepts, Update::Parallel) => {
             parallel::<B, Tight>(blocks, p, dimensions, options, progress)
         }
         (LogitModel::Printed, Update::Serial) => serial::<B, Quarter>(blocks, p, dimensions, options, progress),
-        (LogitModel::Printed, Update::Parallel) => {
-            parallel::<B, Quarter>(blocks, p, dimensions, options, progress)
-        }
+        (LogitModel::Printed, Update::Parallel) => parallel::<B, Quarter>(blocks, p, dimensions, options, progress),
     }
 }
 
@@ -332,8 +328,7 @@ mod tests {
     /// The affinities of random points of space with a kernel.
     fn cloud(n: usize, kernel: Kernel, seed: u64) -> Affinity {
         let x: Vec<[f64; 3]> = (0..n as u64).map(|i| [0, 1, 2].map(|c| normal(seed + c, i))).collect();
-        let squared: Vec<f64> =
-            (0..n * n).map(|k| (0..3).map(|c| (x[k / n][c] - x[k % n][c]).powi(2)).sum()).collect();
+        let squared: Vec<f64> = (0..n * n).map(|k| (0..3).map(|c| (x[k / n][c] - x[k % n][c]).powi(2)).sum()).collect();
         let width = KernelWidth::Relative(0.2);
         Affinity::from_squared_distances(&squared, n, kernel, width, &Progress::new()).expect("valid")
     }
@@ -435,8 +430,7 @@ mod tests {
 
     #[test]
     fn parallel_takes_falling_steps_back_and_does_not_depend_on_threads() {
-        for (model, kernel) in
-            [(LogitModel::WithIntercepts, Kernel::Logistic), (LogitModel::Printed, Kernel::Gaussian)]
+        for (model, kernel) in [(LogitModel::WithIntercepts, Kernel::Logistic), (LogitModel::Printed, Kernel::Gaussian)]
         {
             let affinity = cloud(60, kernel, 6);
             let (_, start) = random_problem(60, 2, 6);
@@ -461,8 +455,8 @@ mod tests {
         let shape = rectangle(8, 8, 1.0, 1.0);
         let squared = shape.squared_distances();
         let width = KernelWidth::Relative(0.2);
-        let affinity = Affinity::from_squared_distances(&squared, 64, Kernel::Logistic, width, &Progress::new())
-            .expect("valid");
+        let affinity =
+            Affinity::from_squared_distances(&squared, 64, Kernel::Logistic, width, &Progress::new()).expect("valid");
         let (_, start) = random_problem(64, 2, 1);
         let options = FitOptions { max_sweeps: 2000, tolerance: 1e-15, ..FitOptions::default() };
         let fit = fit(&affinity, 2, &start, &[], &options, &Progress::new()).expect("valid");
@@ -484,6 +478,9 @@ mod tests {
         assert_eq!(run(&nan, &[], 2), Some(EmbeddingError::NotFinite { point: 3, component: 1 }));
         let progress = Progress::new();
         progress.cancel();
-        assert_eq!(fit(&affinity, 2, &start, &[], &options, &progress).err(), Some(EmbeddingError::Cancelled(Cancelled)));
+        assert_eq!(
+            fit(&affinity, 2, &start, &[], &options, &progress).err(),
+            Some(EmbeddingError::Cancelled(Cancelled))
+        );
     }
 }

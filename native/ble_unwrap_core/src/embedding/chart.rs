@@ -135,7 +135,7 @@ fn mean_squared_distance(distances: &LandmarkDistances) -> Result<f64, Embedding
 fn planar_mds(squared: &[f64], k: usize) -> Result<Mds, EmbeddingError> {
     let mds = classical_mds(squared, k, 2)?;
     let [first, second] = [mds.eigenvalues[0], mds.eigenvalues[1].max(0.0)];
-    if !(first > 0.0) {
+    if first.is_nan() || first <= 0.0 {
         return Err(EmbeddingError::NoExtent);
     }
     let ratio = (second / first).sqrt();
@@ -209,54 +209,41 @@ mod tests {
 
     #[test]
     fn printed_model_flips_as_documented() {
-        // Of the triangles of a patch of 1,000 vertices: square and disc one in twelve, 3:1 every second.
-        let share = |shape: &FlatShape| {
-            let n = shape.points.len();
-            let chart = run(shape, n, &EmbeddingSettings::paper());
+        // Exact distances, 1,000 vertices. A disc of evenly spaced rings is the one flat shape found that
+        // the printed model can flatten, and only at the preset's kernel width.
+        let share = |shape: &FlatShape, kernel_width| {
+            let settings = EmbeddingSettings { kernel_width, ..EmbeddingSettings::paper() };
+            let chart = run(shape, shape.points.len(), &settings);
             flips(shape, &chart.uv) as f64 / shape.triangles.len() as f64
         };
-        let (square, round, long) = (rectangle(22, 22, 1.0, 1.0), disc(12), rectangle(38, 13, 3.0, 1.0));
-        let found = [share(&square), share(&round), share(&long)];
-        assert!((0.02..0.2).contains(&found[0]), "{found:?}");
-        assert!((0.02..0.25).contains(&found[1]), "{found:?}");
-        assert!((0.35..=0.5).contains(&found[2]), "{found:?}");
+        let (square, round, long) = (rectangle(32, 32, 1.0, 1.0), disc(18), rectangle(55, 19, 3.0, 1.0));
+        let found = [share(&square, None), share(&long, None), share(&round, None), share(&round, Some(0.3))];
+        for (share, range) in found.iter().zip([0.04..0.12, 0.45..0.51, 0.0..0.02, 0.4..0.51]) {
+            assert!(range.contains(share), "{found:?}");
+        }
     }
 
     #[test]
-    fn explore() {
-        use crate::embedding::*;
-        let shape = disc(18);
+    fn landmarks_lose_little_on_a_spherical_cap() {
+        // Great-circle distances on a cap of 60 degrees, no plane figure's: all vertices against 60.
+        let shape = disc(9);
         let n = shape.points.len();
-        let sq = shape.squared_distances();
-        let pr = Progress::new();
-        let start = random_start(n, 2, 1);
-        for (model, kernel, width) in [(LogitModel::Printed, Kernel::Gaussian, KernelWidth::MeanAffinity(0.57)), (LogitModel::WithIntercepts, Kernel::Logistic, KernelWidth::Relative(0.2))] {
-            let mut best = [f64::MAX; 5];
-            let mut sw = 0;
-            for _ in 0..12 {
-                let t = std::time::Instant::now();
-                let a = Affinity::from_squared_distances(&sq, n, kernel, width, &pr).expect("v");
-                best[0] = best[0].min(t.elapsed().as_secs_f64());
-                let o = FitOptions { model, max_sweeps: 10, tolerance: 0.0, ..FitOptions::default() };
-                let t = std::time::Instant::now();
-                let f = fit(&a, 2, &start, &[], &o, &pr).expect("v");
-                best[1] = best[1].min(t.elapsed().as_secs_f64());
-                sw = f.sweeps;
-                let t = std::time::Instant::now();
-                std::hint::black_box(a.saturated_log_likelihood());
-                best[2] = best[2].min(t.elapsed().as_secs_f64());
-                let d = shape.distances(100);
-                let o = EmbeddingSettings::default();
-                let t = std::time::Instant::now();
-                let m = LandmarkModel::new(&f.coordinates[..200], if f.intercepts.is_empty() { &[] } else {&f.intercepts[..100]}, kernel, a.sigma());
-                m.place_all(&d, &pr).expect("v");
-                best[3] = best[3].min(t.elapsed().as_secs_f64() / n as f64 * 1e3);
-                let t = std::time::Instant::now();
-                embed_chart(&d, &o, 1, &pr).expect("v");
-                best[4] = best[4].min(t.elapsed().as_secs_f64());
-            }
-            eprintln!("n {n} sweeps {sw} ms: affinity {:.2} fit {:.2} entropy {:.2} place us/vertex {:.3} chart100 {:.2}", best[0]*1e3, best[1]*1e3, best[2]*1e3, best[3]*1e3, best[4]*1e3);
-        }
+        let unit = |p: &Point2<f64>| {
+            let (angle, azimuth) = (p.coords.norm() * 60.0_f64.to_radians(), p.y.atan2(p.x));
+            nalgebra::Vector3::new(angle.sin() * azimuth.cos(), angle.sin() * azimuth.sin(), angle.cos())
+        };
+        let sphere: Vec<_> = shape.points.iter().map(unit).collect();
+        let cap = |k: usize| {
+            let landmarks = shape.distances(k).landmarks().to_vec();
+            let from = |l: &VertexId| sphere.iter().map(|p| p.angle(&sphere[l.index()]) as f32).collect::<Vec<_>>();
+            let rows = landmarks.iter().flat_map(from).collect();
+            let distances = LandmarkDistances::new(landmarks, n, rows);
+            embed_chart(&distances, &EmbeddingSettings::default(), 0, &Progress::new()).expect("spans a plane").uv
+        };
+        let (all, some) = (cap(n), cap(60));
+        assert_eq!((flips(&shape, &all), flips(&shape, &some)), (0, 0));
+        let apart = misfit(&all, &flat(&some));
+        assert!(apart < 0.02, "{apart}");
     }
 
     #[test]

@@ -113,11 +113,7 @@ impl LandmarkModel {
     ///
     /// # Panics
     /// If the distances are not from as many landmarks as the model has.
-    pub fn place_all(
-        &self,
-        distances: &LandmarkDistances,
-        progress: &Progress,
-    ) -> Result<Vec<[f64; 3]>, Cancelled> {
+    pub fn place_all(&self, distances: &LandmarkDistances, progress: &Progress) -> Result<Vec<[f64; 3]>, Cancelled> {
         assert_eq!(distances.len(), self.x.len(), "the distances are those of the model's landmarks");
         let mut placed = vec![[0.0; 3]; distances.vertex_count()];
         placed.par_chunks_mut(CHUNK).enumerate().try_for_each_init(Scratch::default, |scratch, (c, chunk)| {

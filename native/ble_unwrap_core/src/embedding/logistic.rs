@@ -115,7 +115,7 @@ impl RowSums {
 /// of 64 affinities ≥ ½ is far from underflow.
 const BLOCK: usize = 64;
 /// Independent partial sums, so that additions overlap and vectorise. Fixed: it decides the bytes.
-const LANES: usize = 2;
+const LANES: usize = 4;
 
 /// The sums of the point `theta = (x, y, a)` against `others`, whose affinities to it are `p`.
 ///
@@ -123,8 +123,7 @@ const LANES: usize = 2;
 pub(super) fn planar_row<C: Curvature>(p: &[f64], others: PlanarPoints<'_>, theta: [f64; 3]) -> RowSums {
     let mut sums = RowSums::default();
     let [x0, y0, a0] = theta;
-    let blocks =
-        p.chunks(BLOCK).zip(others.x.chunks(BLOCK)).zip(others.y.chunks(BLOCK)).zip(others.a.chunks(BLOCK));
+    let blocks = p.chunks(BLOCK).zip(others.x.chunks(BLOCK)).zip(others.y.chunks(BLOCK)).zip(others.a.chunks(BLOCK));
     for (((p, x), y), a) in blocks {
         let n = p.len().min(x.len()).min(y.len()).min(a.len());
         let (p, x, y, a) = (&p[..n], &x[..n], &y[..n], &a[..n]);
@@ -195,8 +194,7 @@ fn reduce(residual: &[f64], weight: &[f64], x: &[f64], y: &[f64], sums: &mut Row
 /// The log-likelihood part of [`planar_row`] alone.
 pub(super) fn planar_log_likelihood(p: &[f64], others: PlanarPoints<'_>, theta: [f64; 3]) -> f64 {
     let mut total = 0.0;
-    let blocks =
-        p.chunks(BLOCK).zip(others.x.chunks(BLOCK)).zip(others.y.chunks(BLOCK)).zip(others.a.chunks(BLOCK));
+    let blocks = p.chunks(BLOCK).zip(others.x.chunks(BLOCK)).zip(others.y.chunks(BLOCK)).zip(others.a.chunks(BLOCK));
     for (((p, x), y), a) in blocks {
         let (mut linear, mut larger) = ([0.0; BLOCK], [1.0; BLOCK]);
         for (((((p, x), y), a), linear), larger) in p.iter().zip(x).zip(y).zip(a).zip(&mut linear).zip(&mut larger) {

@@ -6,7 +6,7 @@
 //! distances leave open (side, direction, place, and for the printed model scale).
 //!
 //! # Stage
-//! 1. Pieces that need no embedding: [`plane`], [`unfold`].
+//! 1. Pieces that need no embedding: [`plane`], [`unfold()`].
 //! 2. [`embed_chart`]: σ from all distances; the landmarks by Bernoulli logistic embedding
 //!    ([`fit`]) from classical scaling or a seeded random start; every other vertex by logistic
 //!    regression on the landmarks ([`LandmarkModel`]). Isomap instead, for comparison.

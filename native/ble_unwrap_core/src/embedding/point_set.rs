@@ -104,7 +104,7 @@ pub fn embed(
 fn squared_between(data: &[f64], n: usize, p: usize, progress: &Progress) -> Result<Vec<f64>, EmbeddingError> {
     // The sum of the squared distances of all pairs stays finite.
     let largest = (0.1 * f64::MAX / p.max(1) as f64).sqrt() / n as f64;
-    if let Some(i) = data.iter().position(|v| !(v.abs() < largest)) {
+    if let Some(i) = data.iter().position(|v| v.is_nan() || v.abs() >= largest) {
         return Err(EmbeddingError::NotFinite { point: i / p, component: i % p });
     }
     let point = |i: usize| &data[i * p..(i + 1) * p];
@@ -154,8 +154,7 @@ mod tests {
         let flat = rectangle(6, 9, 2.0, 3.0).points;
         let n = flat.len();
         // An isometric copy in five dimensions.
-        let points: Vec<f64> =
-            flat.iter().flat_map(|c| [0.6 * c.x, 0.8 * c.x, 7.0, 0.28 * c.y, 0.96 * c.y]).collect();
+        let points: Vec<f64> = flat.iter().flat_map(|c| [0.6 * c.x, 0.8 * c.x, 7.0, 0.28 * c.y, 0.96 * c.y]).collect();
         let distances: Vec<f64> = (0..n * n).map(|k| (flat[k / n] - flat[k % n]).norm()).collect();
         let settings = EmbeddingSettings::default();
         let from_points = run(EmbedInput::Points { n, p: 5, data: &points }, 2, &settings).expect("valid");

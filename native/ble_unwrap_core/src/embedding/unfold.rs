@@ -32,7 +32,8 @@ pub fn plane(mesh: &TriMesh) -> Option<Vec<Point2<f64>>> {
         let length = normal.norm();
         let longest = f.halfedges().map(|h| mesh.edge_length(h)).into_iter().fold(0.0, f64::max);
         let flat = length <= RestTriangle::MIN_HEIGHT * longest * longest;
-        if !flat && !(normal.dot(&mean) >= COPLANAR_COS * length) {
+        let leans = normal.dot(&mean) < COPLANAR_COS * length;
+        if length.is_nan() || (!flat && leans) {
             return None;
         }
     }
@@ -42,12 +43,8 @@ pub fn plane(mesh: &TriMesh) -> Option<Vec<Point2<f64>>> {
     let v = mean.cross(&u);
     let n = mesh.vertex_count() as f64;
     let centre = mesh.positions().iter().map(|p| p.coords).sum::<Vector3<f64>>() / n;
-    let projected: Vec<Point2<f64>> = mesh
-        .positions()
-        .iter()
-        .map(|p| p.coords - centre)
-        .map(|d| Point2::new(d.dot(&u), d.dot(&v)))
-        .collect();
+    let projected: Vec<Point2<f64>> =
+        mesh.positions().iter().map(|p| p.coords - centre).map(|d| Point2::new(d.dot(&u), d.dot(&v))).collect();
     projected.iter().all(|p| p.x.is_finite() && p.y.is_finite()).then_some(projected)
 }
 

@@ -6,7 +6,9 @@
 mod classical_mds;
 mod sparse;
 mod symmetric;
+mod vector_state;
 
 pub use classical_mds::{Mds, classical_mds};
 pub use sparse::{SparseCholesky, SparseError, SparsePattern};
 pub use symmetric::{EigenError, Eigenpairs, leading_eigenpairs};
+pub use vector_state::restore_vector_state;

@@ -5,6 +5,8 @@ use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_
 use faer::{Mat, MatRef, Par};
 use thiserror::Error;
 
+use super::vector_state::restore_vector_state;
+
 /// Why a symmetric matrix has no eigenpairs to give.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum EigenError {
@@ -55,15 +57,16 @@ pub fn leading_eigenpairs(matrix: &[f64], n: usize, count: usize) -> Result<Eige
     let mut vectors = Mat::<f64>::zeros(n, n);
     let mut values = faer::diag::Diag::<f64>::zeros(n);
     let scratch = self_adjoint_evd_scratch::<f64>(n, ComputeEigenvectors::Yes, Par::Seq, faer::prelude::default());
-    self_adjoint_evd(
+    let outcome = self_adjoint_evd(
         MatRef::from_row_major_slice(matrix, n, n),
         values.as_mut(),
         Some(vectors.as_mut()),
         Par::Seq,
         MemStack::new(&mut MemBuffer::new(scratch)),
         faer::prelude::default(),
-    )
-    .map_err(|_| EigenError::NoConvergence)?;
+    );
+    restore_vector_state();
+    outcome.map_err(|_| EigenError::NoConvergence)?;
 
     let mut leading = vec![0.0; n * count];
     for j in 0..count {
