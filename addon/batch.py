@@ -5,6 +5,8 @@ others are written, the report says why); 2 wrong usage; 3 Blender or the native
 written but a certificate does not hold.
 """
 
+# ruff: noqa: T201  (the command line talks through print)
+
 import argparse
 import hashlib
 import json
@@ -18,11 +20,10 @@ from pathlib import Path
 import bpy
 
 from . import asset_io, comparison, engine, mesh_bridge, properties
-from .task import UnwrapTask
+from .task import unwrap_objects
 
 OK, SOME_FAILED, USAGE, ENVIRONMENT, VIOLATED = range(5)
 REPORT_SCHEMA = 1
-POLL_SECONDS = 0.02
 # No selection and no old place exist for a file.
 EXCLUDED_SETTINGS = ("use_selection",)
 
@@ -94,9 +95,7 @@ def make_parser():
     parser.add_argument("--format", choices=asset_io.OUTPUT_FORMATS, help="output format (default: the input's)")
     parser.add_argument("--report", metavar="FILE", help="write a JSON report")
     parser.add_argument("--resume", action="store_true", help="skip what the report lists as done and is unchanged")
-    parser.add_argument(
-        "--atlas", choices=("asset", "object"), default="asset", help="one atlas for all (default: asset)"
-    )
+    parser.add_argument("--atlas", choices=("asset", "object"), default="asset", help="one atlas per (default: asset)")
     parser.add_argument("--compare", action="store_true", help="also measure Smart UV Project at the same margin")
     parser.add_argument("--threads", type=int, default=0, help="processor threads, 0 for all (default: 0)")
     parser.add_argument("--quiet", action="store_true", help="print errors only")
@@ -186,7 +185,7 @@ def process(source, target, settings, arguments):
             raise mesh_bridge.MeshError("holds no faces")
         groups = [with_faces] if arguments.atlas == "asset" else [[obj] for obj in with_faces]
         outcomes = [unwrap_objects(group, settings, threads=arguments.threads) for group in groups]
-        asset["objects"] = [describe(group, outcome) for group, outcome in zip(groups, outcomes)]
+        asset["objects"] = [describe(group, outcome) for group, outcome in zip(groups, outcomes, strict=True)]
         asset["warnings"] = [text for outcome in outcomes for text in outcome.certificate.warnings]
         asset["summary"] = "; ".join(outcome.summary for outcome in outcomes)
         if arguments.compare:
@@ -203,25 +202,6 @@ def process(source, target, settings, arguments):
         asset["error"] = f"internal error, please report it: {type(error).__name__}: {error}"
     asset["time_s"] = round(time.perf_counter() - started, 4)
     return asset
-
-
-def unwrap_objects(objects, settings, *, threads=0, progress=None):
-    """Unwraps mesh objects into one atlas and writes it; returns the `task.Outcome`.
-
-    `settings` as in the panel, missing ones at their defaults; `progress(fraction, stage)` is called while it runs.
-    """
-    settings = {"preset": "DEFAULT", "use_selection": False, **settings}
-    task = UnwrapTask(mesh_bridge.unique_meshes(objects), settings, threads=threads)
-    job = task.start()
-    try:
-        while not job.is_finished():
-            if progress:
-                progress(job.progress(), job.stage())
-            time.sleep(POLL_SECONDS)
-    except KeyboardInterrupt:
-        job.cancel()
-        raise
-    return task.write(job.result())
 
 
 def describe(objects, outcome):
@@ -242,12 +222,12 @@ def describe(objects, outcome):
 def add_baseline(asset, groups, settings):
     """Measures Smart UV Project in a UV map of its own, and takes that map away again."""
     full = {**properties.default_values(settings["preset"]), **settings}
-    for entry, group in zip(asset["objects"], groups):
+    for entry, group in zip(asset["objects"], groups, strict=True):
         active = [obj.data.uv_layers.active.name for obj in group]
         results, best = comparison.best_smart_uv(group, margin=full["margin"], texture_size=full["texture_size"])
         entry["baseline_smart_uv"] = {"best_angle": best, "by_angle": results}
-        for obj, name in zip(group, active):
-            obj.data.uv_layers.remove(obj.data.uv_layers["Smart UV Project"])
+        for obj, name in zip(group, active, strict=True):
+            obj.data.uv_layers.remove(obj.data.uv_layers[comparison.SMART_MAP])
             obj.data.uv_layers.active = obj.data.uv_layers[name]
 
 

@@ -6,24 +6,24 @@ import time
 import bmesh
 import bpy
 
-from . import engine, mesh_bridge
+from . import engine, mesh_bridge, properties
+from .task import unwrap_objects
+
+BLE_MAP = "BLE Unwrap"
+SMART_MAP = "Smart UV Project"
 
 # Angle limits in degrees among which Smart UV Project may pick its best; 66 is its own default.
 DEFAULT_ANGLE = 66
 ANGLES = (30, 45, 66, 80)
 
 
-def smart_uv(objects, *, margin, texture_size, angle=DEFAULT_ANGLE, map_name="Smart UV Project"):
+def smart_uv(objects, *, margin, texture_size, angle=DEFAULT_ANGLE, map_name=SMART_MAP):
     """Unwraps with Smart UV Project into a UV map of that name at a margin in pixels; returns the seconds it took.
 
     Every property is passed, since their defaults differ between versions of Blender.
     """
     objects = mesh_bridge.unique_meshes(objects)
-    for obj in objects:
-        layer = obj.data.uv_layers.get(map_name) or obj.data.uv_layers.new(name=map_name)
-        if layer is None:
-            raise mesh_bridge.MeshError(f"{obj.name}: Blender could not add a UV map")
-        obj.data.uv_layers.active = layer
+    activate_map(objects, map_name)
     with _everything_selected(objects):
         started = time.perf_counter()
         bpy.ops.uv.smart_project(
@@ -47,7 +47,7 @@ def measure_active(objects, *, margin, texture_size):
     return engine.measure(selection, held, texture_size=texture_size, margin=margin)
 
 
-def best_smart_uv(objects, *, margin, texture_size, angles=ANGLES, map_name="Smart UV Project"):
+def best_smart_uv(objects, *, margin, texture_size, angles=ANGLES, map_name=SMART_MAP):
     """Smart UV Project at its best angle: fewest overlaps and flips, then least stretch.
 
     Returns {angle: measurement with "seconds_total"} and the best angle; its UVs are left in the map.
@@ -61,6 +61,48 @@ def best_smart_uv(objects, *, margin, texture_size, angles=ANGLES, map_name="Sma
     if best != angles[-1]:
         smart_uv(objects, margin=margin, texture_size=texture_size, angle=best, map_name=map_name)
     return results, best
+
+
+def compare(objects, settings, *, angles=ANGLES, threads=0, progress=None):
+    """BLE Unwrap and Smart UV Project on the same objects, at the same margin, by the same yardstick.
+
+    Returns {"ble_unwrap": …, "smart_uv_default": …, "smart_uv_best": …}, each the measurement with "seconds_total" and
+    Blender's own count of overlapping faces; both layouts stay in UV maps named `BLE_MAP` and `SMART_MAP`.
+    """
+    settings = {
+        **properties.default_values(settings.get("preset", "DEFAULT")),
+        **settings,
+        "use_selection": False,
+        "uv_map": "ACTIVE",
+        "use_original_bounds": False,
+    }
+    target = {"margin": settings["margin"], "texture_size": settings["texture_size"]}
+    objects = mesh_bridge.unique_meshes(objects)
+    activate_map(objects, BLE_MAP)
+    outcome = unwrap_objects(objects, settings, threads=threads, progress=progress)
+    rows = {"ble_unwrap": {**outcome.certificate.measured, "seconds_total": outcome.seconds}}
+    rows["ble_unwrap"]["violations"] = outcome.certificate.violations
+    rows["ble_unwrap"]["seconds"] = outcome.report.get("seconds")
+    rows["ble_unwrap"]["blender_overlapping_faces"] = overlapping_faces(objects)
+    by_angle, best = best_smart_uv(objects, angles=angles, map_name=SMART_MAP, **target)
+    for measured in by_angle.values():
+        measured["violations"] = engine.certify(
+            measured, margin=settings["margin"], stretch_limit=settings["stretch_limit"]
+        ).violations
+    by_angle[best]["blender_overlapping_faces"] = overlapping_faces(objects)
+    rows["smart_uv_best"] = {**by_angle[best], "angle": best}
+    if DEFAULT_ANGLE in by_angle:
+        rows["smart_uv_default"] = {**by_angle[DEFAULT_ANGLE], "angle": DEFAULT_ANGLE}
+    return rows
+
+
+def activate_map(objects, name):
+    """Makes the UV map of this name the active one of every object, adding it where it is missing."""
+    for obj in objects:
+        layer = obj.data.uv_layers.get(name) or obj.data.uv_layers.new(name=name)
+        if layer is None:
+            raise mesh_bridge.MeshError(f"{obj.name}: Blender could not add a UV map")
+        obj.data.uv_layers.active = layer
 
 
 def _rank(measured):

@@ -1,4 +1,4 @@
-"""Settings and arrays in, plain results out: the only file that imports `ble_unwrap_native`, and it knows no Blender."""
+"""Settings and arrays in, plain results out: alone imports `ble_unwrap_native`, and knows nothing of Blender."""
 
 from dataclasses import dataclass, field
 

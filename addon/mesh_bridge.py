@@ -124,7 +124,9 @@ def gather(objects, *, only_selected=False, make_new_map=False):
         raise MeshError("No faces are selected" if only_selected else "There are no faces to unwrap")
     if max(vertex_base, corner_base) > np.iinfo(np.int32).max:
         raise MeshError("The selection is too large: more than two thousand million corners")
-    positions, corner_vertices, sizes, triangles, seams = (np.concatenate(column) for column in zip(*blocks))
+    positions, corner_vertices, sizes, triangles, seams = (
+        np.concatenate(column) for column in zip(*blocks, strict=True)
+    )
     offsets = np.zeros(len(sizes) + 1, np.int32)
     np.cumsum(sizes, out=offsets[1:])
     return Selection(
@@ -306,7 +308,7 @@ def write_uvs(selection, uv, *, make_new_map=False, map_name="UVMap", mark_seams
         raise MeshError(f"A mesh has {MAX_UV_MAPS} UV maps already; nothing was changed")
     held = np.empty_like(uv)
     with object_mode(meshes):
-        for part, mesh in zip(selection.parts, meshes):
+        for part, mesh in zip(selection.parts, meshes, strict=True):
             layer = writable_layer(mesh, make_new_map, map_name)
             layer_name = layer.name
             if part.source_corners is None:
@@ -341,7 +343,7 @@ def read_uvs(selection):
         return None
     held = np.empty((selection.face_offsets[-1], 2), np.float32)
     with object_mode(meshes):
-        for part, mesh in zip(selection.parts, meshes):
+        for part, mesh in zip(selection.parts, meshes, strict=True):
             values = read_array(mesh.uv_layers.active.uv, "vector", np.float32, 2)
             held[part.corners] = values if part.source_corners is None else values[part.source_corners]
     return held

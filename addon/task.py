@@ -7,6 +7,7 @@ import numpy as np
 
 from . import engine, mesh_bridge, properties
 
+POLL_SECONDS = 0.02
 SMALLEST_BOUNDS = 1e-4  # of the unit square: a smaller rectangle is no place to pack into
 
 
@@ -98,3 +99,22 @@ class UnwrapTask:
             summary=engine.summary(measured, seconds),
             lines=engine.lines(certificate, margin=margin, stretch_limit=limit),
         )
+
+
+def unwrap_objects(objects, settings, *, threads=0, progress=None):
+    """Unwraps mesh objects into one atlas and writes it; returns the `Outcome`.
+
+    `settings` as in the panel, missing ones at their defaults; `progress(fraction, stage)` is called while it runs.
+    """
+    settings = {"preset": "DEFAULT", "use_selection": False, **settings}
+    task = UnwrapTask(mesh_bridge.unique_meshes(objects), settings, threads=threads)
+    job = task.start()
+    try:
+        while not job.is_finished():
+            if progress:
+                progress(job.progress(), job.stage())
+            time.sleep(POLL_SECONDS)
+    except KeyboardInterrupt:
+        job.cancel()
+        raise
+    return task.write(job.result())

@@ -26,14 +26,13 @@ def package():
     except ImportError as error:
         print(f"This needs Blender, or Python with `pip install bpy` ({error})", file=sys.stderr)
         sys.exit(ENVIRONMENT)
-    for module in bpy.context.preferences.addons.keys():
-        if module.startswith("bl_ext.") and module.endswith(".ble_unwrap"):
-            return module
+    for enabled in bpy.context.preferences.addons:
+        if _is_ours(enabled.module):
+            return enabled.module
     if os.environ.get("BLE_UNWRAP_SOURCE") != "1":
         for module in addon_utils.modules(refresh=True):
-            if module.__name__.startswith("bl_ext.") and module.__name__.endswith(".ble_unwrap"):
-                if addon_utils.enable(module.__name__) is not None:
-                    return module.__name__
+            if _is_ours(module.__name__) and addon_utils.enable(module.__name__) is not None:
+                return module.__name__
     if "ble_unwrap" not in sys.modules:
         spec = importlib.util.spec_from_file_location(
             "ble_unwrap", SOURCE / "__init__.py", submodule_search_locations=[str(SOURCE)]
@@ -42,6 +41,10 @@ def package():
         sys.modules["ble_unwrap"] = module
         spec.loader.exec_module(module)
     return "ble_unwrap"
+
+
+def _is_ours(module):
+    return module.startswith("bl_ext.") and module.endswith(".ble_unwrap")
 
 
 def arguments():
