@@ -8,6 +8,9 @@ import numpy as np
 MARGIN_SLACK_TEXELS = 0.01
 STRETCH_SLACK = 1e-3
 
+# Settings whose 0 in the panel is the native module's None.
+ZERO_IS_AUTOMATIC = ("landmark_max", "kernel_width")
+
 NATIVE_NAME = "ble_unwrap_native"
 
 
@@ -65,13 +68,18 @@ def version():
         return None
 
 
+def default_settings(preset):
+    """The native module's own values of a preset, in its words."""
+    return dict(native().default_settings(preset.lower()))
+
+
 def native_settings(settings):
     """Settings in the native module's words: enum values in lower case, bridge settings left out by the caller."""
     result = {}
     for name, value in settings.items():
         if isinstance(value, str):
             value = value.lower()
-        elif name == "landmark_max" and value == 0:
+        elif name in ZERO_IS_AUTOMATIC and value == 0:
             value = None
         elif name == "texture_size" and not isinstance(value, int):
             value = tuple(value)

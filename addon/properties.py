@@ -12,13 +12,15 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, In
 # The native module knows the same presets by name: a test keeps the two in step.
 PAPER_VALUES = {
     "model": "PAPER",
+    "kernel_width": 0.0,
     "relaxation": 1.7,
     "initial": "RANDOM",
     "geodesics": "FAST_MARCHING",
-    "landmark_min": 0,
+    "landmark_min": 3,
     "landmark_max": 0,
     "holes": "CUT",
     "stretch_solver": "LINE_SEARCH",
+    "stretch_iterations": 60,
     "margin": 2.0,
     "texture_size": (1024, 1024),
     "rotation": "QUARTER",
@@ -69,7 +71,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         default=(2048, 2048),
         size=2,
         min=16,
-        max=32768,
+        max=16384,
         soft_min=256,
         soft_max=8192,
     )
@@ -191,7 +193,8 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         name="At Least",
         description="Fewest landmarks of a chart",
         default=48,
-        min=0,
+        min=3,
+        max=100_000,
         soft_max=1000,
     )
     landmark_max: IntProperty(
@@ -199,6 +202,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         description="Most landmarks of a chart; 0 sets no bound",
         default=160,
         min=0,
+        max=100_000,
         soft_max=2000,
     )
 
@@ -215,11 +219,13 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     )
     kernel_width: FloatProperty(
         name="Kernel Width",
-        description="Width of the affinity as a multiple of the mean squared distance; useful from 0.1 to 0.3",
+        description=(
+            "Width of the affinity as a multiple of the mean squared distance; useful from 0.1 to 0.3. "
+            "0 takes the model's own"
+        ),
         default=0.2,
-        min=0.001,
+        min=0.0,
         max=10.0,
-        soft_min=0.05,
         soft_max=1.0,
         step=1,
         precision=3,
@@ -282,7 +288,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     stretch_iterations: IntProperty(
         name="Iterations",
         description="Most iterations of the stretch solver",
-        default=30,
+        default=40,
         min=1,
         max=10000,
         soft_max=500,
