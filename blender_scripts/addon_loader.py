@@ -31,7 +31,7 @@ def package():
             return enabled.module
     if os.environ.get("BLE_UNWRAP_SOURCE") != "1":
         for module in addon_utils.modules(refresh=True):
-            if _is_ours(module.__name__) and addon_utils.enable(module.__name__) is not None:
+            if _is_ours(module.__name__) and addon_utils.enable(module.__name__, default_set=True) is not None:
                 return module.__name__
     if "ble_unwrap" not in sys.modules:
         spec = importlib.util.spec_from_file_location(
