@@ -249,7 +249,7 @@ fn the_number_of_threads_changes_nothing() {
         pool.install(|| soup.verify())
     };
     let one = with(1);
-    assert!(one.crossings_between.count > 50 && one.crossings_inside.count > 5, "{one:?}");
+    assert!(one.crossings_between.count > 50 && one.crossings_inside.count > 1, "{one:?}");
     assert_eq!(one, with(2));
     assert_eq!(one, with(8));
 }
