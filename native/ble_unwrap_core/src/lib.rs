@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod distortion;
+pub mod embedding;
 pub mod geodesics;
 pub mod linalg;
 pub mod mesh;
