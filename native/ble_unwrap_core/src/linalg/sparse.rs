@@ -9,6 +9,8 @@ use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side, Spec};
 use thiserror::Error;
 
+use super::vector_state::restore_vector_state;
+
 /// Why a sparse system could not be factored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum SparseError {
@@ -169,6 +171,7 @@ impl SparseCholesky {
             MemStack::new(&mut self.factor_scratch),
             Spec::default(),
         );
+        restore_vector_state();
         match done {
             Ok(_) => Ok(()),
             Err(LltError::NonPositivePivot { index }) => {
@@ -193,6 +196,7 @@ impl SparseCholesky {
         let rhs = MatMut::from_column_major_slice_mut(columns, n, count);
         let stack = MemStack::new(&mut self.solve_scratch);
         LltRef::new(&self.symbolic, &self.factor).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack);
+        restore_vector_state();
     }
 }
 
