@@ -63,8 +63,8 @@ pub struct StretchSettings {
     pub tolerance: f64,
     /// Weight of the symmetric Dirichlet energy beside the L2 stretch, 0 to 1. For Newton only. More keeps
     /// the worst triangle better, less lowers the L2 stretch: on half a cat, half a fan disk and a
-    /// camel's head 0.15 gives 1.114, 1.095, 1.322, 0.05 gives 1.107, 1.092, 1.301, 0 gives 1.098, 1.079, 1.210
-    /// after two to four times the steps.
+    /// camel's head 0.15 gives 1.114, 1.095, 1.322, 0.05 gives 1.107, 1.092, 1.301, 0 gives 1.099, 1.079, 1.211
+    /// in up to four times the steps.
     pub dirichlet_weight: f64,
 }
 
