@@ -127,13 +127,9 @@ impl SparseCholesky {
     pub fn analyse(pattern: SparsePattern) -> Result<Self, SparseError> {
         let n = pattern.size();
         let a = SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_start, None, &pattern.row);
-        let symbolic = factorize_symbolic_cholesky(
-            a,
-            Side::Upper,
-            SymmetricOrdering::Amd,
-            CholeskySymbolicParams::default(),
-        )
-        .map_err(|_: FaerError| SparseError::TooLarge)?;
+        let symbolic =
+            factorize_symbolic_cholesky(a, Side::Upper, SymmetricOrdering::Amd, CholeskySymbolicParams::default())
+                .map_err(|_: FaerError| SparseError::TooLarge)?;
         let buffer = |req| MemBuffer::try_new(req).map_err(|_| SparseError::TooLarge);
         let factor_scratch = buffer(symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()))?;
         let solve_scratch = buffer(symbolic.solve_in_place_scratch::<f64>(MAX_COLUMNS, Par::Seq))?;
