@@ -132,6 +132,7 @@ impl Raised for UnwrapError {
             Self::Mesh(error) => error.kind(),
             Self::Setting { .. } => Kind::Argument,
             Self::Pack(error) => error.kind(),
+            Self::Check(_) => Kind::Mesh,
             Self::Cancelled(error) => error.kind(),
         }
     }
