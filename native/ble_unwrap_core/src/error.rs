@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::mesh::MeshError;
+use crate::metrics::UvMeshError;
 use crate::packing::PackError;
 use crate::progress::Cancelled;
 
@@ -25,6 +26,9 @@ pub enum UnwrapError {
     /// The charts cannot be packed as asked.
     #[error(transparent)]
     Pack(#[from] PackError),
+    /// The result does not fit the checks, which take 2³⁰ triangles.
+    #[error(transparent)]
+    Check(#[from] UvMeshError),
     /// The caller asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

@@ -19,5 +19,6 @@ pub use fast_marching::{FastMarching, MarchScratch};
 pub use knn_graph::knn_graph;
 pub use landmark_distances::LandmarkDistances;
 pub use landmarks::{choose_landmarks, geodesic_distances, landmark_distances};
+pub(crate) use min_heap::MinHeap;
 pub use settings::{GeodesicSettings, Metric};
 pub use weighted_graph::WeightedGraph;

@@ -5,7 +5,7 @@ use rayon::slice::ParallelSliceMut;
 
 use super::defects::Defects;
 use super::glue::{Glued, Sides};
-use super::index::HalfedgeId;
+use super::index::{HalfedgeId, VertexId};
 use super::input::{MeshError, MeshInput, Polygons};
 use super::measure::triangle_area;
 use super::orient::{Orientation, orient};
@@ -13,6 +13,9 @@ use super::tri_mesh::TriMesh;
 use super::triangulate::{Triangulation, triangulate};
 use super::weld::weld;
 use crate::progress::Progress;
+
+/// Least area, in units of half the extent squared, that sets the scale. Below, it may be rounding.
+const LEAST_AREA: f64 = 1e-12;
 
 /// Choices of [`condition`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,8 +55,8 @@ pub struct Surface {
     pub unmapped: Vec<u32>,
     /// What was found and mended.
     pub defects: Defects,
-    /// Length in the input's unit of one unit of the mesh. Unit area is missed only by surfaces of
-    /// less area than 1e-12 of their extent squared: they have an extent of at most 1e6.
+    /// Length in the input's unit of one unit of the mesh. A surface of less area than 1e-12 of the
+    /// square of half its extent has that half for its unit instead.
     pub scale: f64,
 }
 
@@ -89,7 +92,7 @@ impl Surface {
 /// nowhere else. Most area of each component keeps its input winding. Faces with a non-finite
 /// vertex are left out and listed. A mesh without faces gives an empty surface.
 ///
-/// O(n log n); deterministic. DESIGN, stage S0.
+/// O(n log n); deterministic, whatever the number of threads.
 ///
 /// # Errors
 /// [`MeshError`] names the first element that makes the arrays meaningless, or is
@@ -142,8 +145,7 @@ pub fn condition(input: &MeshInput<'_>, options: &ConditionOptions, progress: &P
     progress.check()?;
 
     // The second pass of scaling: from unit extent to unit area.
-    const LEAST_SIDE: f64 = 1e-6; // of the square of equal area, in extents
-    let unit = if total_area > 0.0 { total_area.sqrt().max(LEAST_SIDE) } else { 1.0 };
+    let unit = if total_area > LEAST_AREA { total_area.sqrt() } else { 1.0 };
     let assembled = assemble(&triangulation, inner, &orientation);
     let (mesh, source) = TriMesh::from_glued(&assembled.corner, assembled.twin, |corner| {
         points[polygons.vertex(corner as usize)] / unit
@@ -152,9 +154,9 @@ pub fn condition(input: &MeshInput<'_>, options: &ConditionOptions, progress: &P
     progress.check()?;
 
     count_welded(&representative, &mut defects);
-    let severed = severed_points(&polygons, &mapped, &representative, &severed, &mut defects);
-    count_bow_ties(&vertex, &representative, &severed, &mut defects);
-    count_duplicates(&polygons, &mapped, &representative, &mut defects);
+    let severed = severed_vertices(&polygons, &mapped, &representative, &severed, &mut defects);
+    count_bow_ties(&polygons, &mesh, &assembled.corner, &severed, &mut defects);
+    count_duplicates(&polygons, &mapped, &mut defects);
     progress.check()?;
 
     Ok(Surface {
@@ -344,9 +346,9 @@ fn count_welded(representative: &[u32], defects: &mut Defects) {
     }
 }
 
-/// Points at which an edge was cut or at which a polygon meets itself: several fans are no bow-tie
+/// Vertices at which an edge was cut or at which a polygon meets itself: several fans are no bow-tie
 /// there. Counts the polygons that meet themselves.
-fn severed_points(
+fn severed_vertices(
     polygons: &Polygons<'_>,
     mapped: &[bool],
     representative: &[u32],
@@ -356,37 +358,43 @@ fn severed_points(
     let mut marked = vec![false; representative.len()];
     for &side in severed {
         for v in polygons.side(side as usize) {
-            marked[representative[v] as usize] = true;
+            marked[v] = true;
         }
     }
     let mut own = Vec::new();
     for p in (0..polygons.len()).filter(|&p| mapped[p]) {
         own.clear();
-        own.extend(polygons.corners(p).map(|c| representative[polygons.vertex(c)]));
+        own.extend(polygons.corners(p).map(|c| polygons.vertex(c)).map(|v| (representative[v], v)));
         own.sort_unstable();
-        let mut repeated = own.windows(2).filter(|w| w[0] == w[1]).map(|w| w[0]).peekable();
-        if repeated.peek().is_some() {
+        let mut meets_itself = false;
+        for pair in own.windows(2).filter(|w| w[0].0 == w[1].0) {
+            meets_itself = true;
+            pair.iter().for_each(|&(_, v)| marked[v] = true);
+        }
+        if meets_itself {
             defects.repeated_vertices.found(p as u32);
         }
-        repeated.for_each(|v| marked[v as usize] = true);
     }
     marked
 }
 
-/// Points with several fans of faces although no edge was cut there.
-fn count_bow_ties(vertex: &[u32], representative: &[u32], severed: &[bool], defects: &mut Defects) {
-    let mut fans = vec![0u32; representative.len()];
-    for &v in vertex {
-        fans[representative[v as usize] as usize] += 1;
+/// Vertices whose corners form several fans although no edge was cut there.
+fn count_bow_ties(polygons: &Polygons<'_>, mesh: &TriMesh, corner: &[u32], severed: &[bool], defects: &mut Defects) {
+    let mut fan = vec![VertexId::NONE; severed.len()];
+    let mut is_bow_tie = vec![false; severed.len()];
+    for (&c, &v) in corner.iter().zip(mesh.triangles().iter().flatten()) {
+        let vertex = polygons.vertex(c as usize);
+        is_bow_tie[vertex] |= !fan[vertex].is_none() && fan[vertex] != v && !severed[vertex];
+        fan[vertex] = v;
     }
-    for v in (0..fans.len()).filter(|&v| fans[v] > 1 && !severed[v]) {
+    for v in (0..is_bow_tie.len()).filter(|&v| is_bow_tie[v]) {
         defects.bow_tie_vertices.found(v as u32);
     }
 }
 
 /// Polygons with the same vertices, in any order, as an earlier one.
-fn count_duplicates(polygons: &Polygons<'_>, mapped: &[bool], representative: &[u32], defects: &mut Defects) {
-    let vertices = |p: usize| polygons.corners(p).map(|c| representative[polygons.vertex(c)]);
+fn count_duplicates(polygons: &Polygons<'_>, mapped: &[bool], defects: &mut Defects) {
+    let vertices = |p: usize| polygons.corners(p).map(|c| polygons.vertex(c) as u32);
     // A sum is the same in any order; scattered, few different sets share one.
     let mut keyed: Vec<(u64, u32)> = (0..polygons.len())
         .filter(|&p| mapped[p])

@@ -25,8 +25,8 @@ impl<T: Copy> Defect<T> {
 
 /// Everything irregular about an input mesh. None of it keeps the mesh from being unwrapped.
 ///
-/// Vertices, edges (vertex pairs) and faces are those of the input. Counts are of the mesh after
-/// welding, if that was asked for.
+/// Vertices, edges (vertex pairs) and faces are those of the input; vertices and faces that merely
+/// coincide are no defects.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Defects {
     /// Edges with more than two faces: the flattest pairs stay joined, the rest is cut.

@@ -18,8 +18,8 @@ const FLAT: f64 = 1e-4;
 /// Appends n − 2 triangles, by corner, that triangulate a polygon of n ≥ 3 corners as a topological
 /// disk, wound as the polygon.
 ///
-/// Seen along the axis nearest to the polygon's Newell normal: dropping a coordinate keeps what is
-/// straight straight and what coincides coincident, and tests are exact. The ear with the shortest
+/// Seen along the Newell normal, or along the axis nearest to it if the polygon is flat: dropping a
+/// coordinate keeps what is straight straight, and tests are exact. The ear with the shortest
 /// diagonal is clipped first, which halves a regular polygon evenly instead of fanning it. A simple
 /// polygon gives triangles that do not overlap in that view, keyholes with coincident bridges
 /// included; of a self-crossing or collapsed one only the topology is promised.
@@ -190,20 +190,36 @@ impl<'a> Clipper<'a> {
     }
 }
 
-/// The outline along the axis nearest to its Newell normal, counter-clockwise.
+/// Greatest distance from the plane, relative to the extent, of polygons that count as flat.
+const WARP: f64 = 1e-6;
+
+/// The outline seen from the side on which it runs counter-clockwise.
 fn project(points: &[Point3<f64>]) -> Vec<Coord<f64>> {
     let origin = points[0];
     let normal: Vector3<f64> =
         points.windows(2).map(|w| (w[0] - origin).cross(&(w[1] - origin))).fold(Vector3::zeros(), |sum, n| sum + n);
-    let axis = if normal.norm_squared() > 0.0 {
-        normal.iamax()
-    } else {
-        // No area: look along the direction of least extent.
-        let extent = |k: usize| points.iter().map(|p| (p[k] - origin[k]).abs()).fold(0.0, f64::max);
-        (0..3).min_by(|&a, &b| extent(a).total_cmp(&extent(b))).unwrap_or(2)
+    let furthest =
+        |direction: Vector3<f64>| points.iter().map(|p| (p - origin).dot(&direction).abs()).fold(0.0, f64::max);
+    let unit = |k: usize| Vector3::ith(k, 1.0);
+    let extent = (0..3).map(|k| furthest(unit(k))).fold(0.0, f64::max);
+    let Some(direction) = normal.try_normalize(0.0) else {
+        // No area: along the axis of least extent.
+        let axis = (0..3).min_by(|&a, &b| furthest(unit(a)).total_cmp(&furthest(unit(b)))).unwrap_or(2);
+        return drop_axis(points, axis, false);
     };
+    let axis = direction.iamax();
+    if furthest(direction) <= WARP * extent {
+        return drop_axis(points, axis, direction[axis] < 0.0);
+    }
+    let u = unit((axis + 1) % 3).cross(&direction).normalize();
+    let v = direction.cross(&u);
+    points.iter().map(|p| p - origin).map(|p| Coord { x: p.dot(&u), y: p.dot(&v) }).collect()
+}
+
+/// The outline along a coordinate axis, from its positive side or from behind.
+fn drop_axis(points: &[Point3<f64>], axis: usize, behind: bool) -> Vec<Coord<f64>> {
     let (mut u, mut v) = ((axis + 1) % 3, (axis + 2) % 3);
-    if normal[axis] < 0.0 {
+    if behind {
         (u, v) = (v, u);
     }
     points.iter().map(|p| Coord { x: p[u], y: p[v] }).collect()
@@ -306,6 +322,20 @@ mod tests {
                 assert!(sum[axis] * sign > 0.0);
             }
         }
+    }
+
+    #[test]
+    fn a_tilted_wave_is_seen_along_its_normal() {
+        let (s, c) = 0.7_f64.sin_cos();
+        let wave = |i: i32| {
+            let t = TAU * f64::from(i) / 64.0;
+            let (x, z) = (t.cos(), 0.8 * (5.0 * t).sin());
+            Point3::new(c * x - s * z, t.sin(), s * x + c * z)
+        };
+        let p: Vec<_> = (0..64).map(wave).collect();
+        let normal = Vector3::new(-s, 0.0, c);
+        let t = triangles(&p);
+        assert!(t.iter().all(|t| area_vector(t.map(|i| p[i as usize])).dot(&normal) > 0.0));
     }
 
     proptest! {

@@ -22,7 +22,8 @@ pub(super) struct Link {
 pub(super) struct Glued {
     /// The edges with two polygons.
     pub(super) links: Vec<Link>,
-    /// Sides that share both ends with another side and yet stay unglued, seams included.
+    /// Sides at whose ends one vertex may become several: unglued ones that share both ends with
+    /// another side, seams, and all sides of edges with more than two.
     pub(super) severed: Vec<u32>,
     /// Edges with more than two polygons.
     pub(super) non_manifold: Defect<[u32; 2]>,
@@ -118,7 +119,7 @@ impl Sides<'_> {
             match *same {
                 [(_, a)] => left.push(a),
                 [(_, a), (_, b)] => self.glue_pair([a, b], welded, glued),
-                _ => self.glue_crowd(same.iter().map(|s| s.1).collect(), welded, glued),
+                _ => self.glue_crowd(&same.iter().map(|s| s.1).collect::<Vec<_>>(), welded, glued),
             }
         }
         match *left {
@@ -127,7 +128,7 @@ impl Sides<'_> {
             [a, b] => self.glue_pair([a, b], welded, glued),
             _ => {
                 left.sort_unstable();
-                self.glue_crowd(left, welded, glued);
+                self.glue_crowd(&left, welded, glued);
             }
         }
     }
@@ -142,43 +143,47 @@ impl Sides<'_> {
     }
 
     /// Pairs up more than two sides, in ascending order, at one edge.
-    fn glue_crowd(&self, sides: Vec<u32>, welded: bool, glued: &mut Glued) {
-        let [a, b] = self.polygons.side(sides[0] as usize);
-        glued.non_manifold.found([a.min(b) as u32, a.max(b) as u32]);
-        let start = self.start(sides[0], welded);
-        let (along, against): (Vec<u32>, Vec<u32>) = sides.iter().partition(|&&s| self.start(s, welded) == start);
-        let mut free = sides;
-        if free.len() > MOST_COMPARED {
-            for (&a, &b) in along.iter().zip(&against) {
-                if self.may_meet([a, b], false) {
-                    glued.links.push(Link { sides: [a.min(b), a.max(b)], same_direction: false });
-                    free.retain(|&s| s != a && s != b);
-                }
-            }
-        } else {
-            let opposed = along.iter().flat_map(|&a| against.iter().map(move |&b| [a, b]));
-            let mut pairs = self.by_flatness(opposed, false);
-            let none_opposed = pairs.is_empty();
-            if none_opposed {
-                let abreast = [&along, &against];
-                let pairs_of = |list: &Vec<u32>| {
-                    let list = list.clone();
-                    (0..list.len())
-                        .flat_map(move |j| (0..j).map(move |i| (i, j)))
-                        .map(move |(i, j)| [list[i], list[j]])
-                        .collect::<Vec<_>>()
-                };
-                pairs = self.by_flatness(abreast.into_iter().flat_map(pairs_of), true);
-                pairs.truncate(1);
-            }
-            for [a, b] in pairs {
-                if free.contains(&a) && free.contains(&b) {
-                    glued.links.push(Link { sides: [a.min(b), a.max(b)], same_direction: none_opposed });
-                    free.retain(|&s| s != a && s != b);
-                }
+    fn glue_crowd(&self, sides: &[u32], welded: bool, glued: &mut Glued) {
+        let (pairs, same_direction) = self.crowd_pairs(sides, welded);
+        let before = glued.links.len();
+        let mut taken = vec![false; sides.len()];
+        for [a, b] in pairs {
+            if let (Ok(i), Ok(j)) = (sides.binary_search(&a), sides.binary_search(&b))
+                && !taken[i]
+                && !taken[j]
+            {
+                (taken[i], taken[j]) = (true, true);
+                glued.links.push(Link { sides: [a.min(b), a.max(b)], same_direction });
             }
         }
-        glued.severed.extend(free);
+        // Layers that merely lie on one another are not an edge of several faces.
+        let edge = self.input_key(sides[0]);
+        if glued.links.len() > before || sides.iter().all(|&s| self.input_key(s) == edge) {
+            glued.non_manifold.found([(edge >> 32) as u32, edge as u32]);
+        }
+        glued.severed.extend(sides);
+    }
+
+    /// Pairs to glue at an edge with more than two sides, best first, and whether both sides of each
+    /// run the same way. A side may occur in several.
+    fn crowd_pairs(&self, sides: &[u32], welded: bool) -> (Vec<[u32; 2]>, bool) {
+        let start = self.start(sides[0], welded);
+        let (along, against): (Vec<u32>, Vec<u32>) = sides.iter().partition(|&&s| self.start(s, welded) == start);
+        if sides.len() > MOST_COMPARED {
+            let pairs = along.iter().zip(&against).map(|(&a, &b)| [a, b]);
+            return (pairs.filter(|&pair| self.may_meet(pair, false)).collect(), false);
+        }
+        let opposed = along.iter().flat_map(|&a| against.iter().map(move |&b| [a, b]));
+        let pairs = self.by_flatness(opposed, false);
+        if !pairs.is_empty() {
+            return (pairs, false);
+        }
+        let within = |list: &[u32]| -> Vec<[u32; 2]> {
+            list.iter().enumerate().flat_map(|(i, &a)| list[i + 1..].iter().map(move |&b| [a, b])).collect()
+        };
+        let mut pairs = self.by_flatness([within(&along), within(&against)].into_iter().flatten(), true);
+        pairs.truncate(1);
+        (pairs, true)
     }
 
     /// The pairs that may be glued, flattest first, at equal angles convex ones, then by corner.

@@ -23,34 +23,64 @@ impl Square {
 
 /// Squares inside the mask whose union is the mask; larger ones first.
 ///
-/// Greedy: at each level, from the largest that fits, squares on a lattice of half their side are
-/// taken where at least half of their cells are new. O(cells · log side) word operations at most.
+/// Greedy: at each level, from the largest that fits down to sides of four, squares on a lattice of
+/// half their side are taken where at least half of their cells are new; what is left, mostly the
+/// staircase of the boundary, goes into squares of two and single cells. O(cells · log side / 64)
+/// for the table of fitting squares and O(cells / 4) counts.
 pub(super) fn cover(mask: &Mask) -> Vec<Square> {
+    let fitting = fitting_squares(mask);
     let mut squares = Vec::new();
     let mut left = mask.clone();
-    let smaller = mask.width().min(mask.height());
-    for level in (0..=smaller.ilog2()).rev() {
+    let mut take = |left: &mut Mask, x: usize, y: usize, level: usize| {
+        squares.push(Square { x: x as u32, y: y as u32, level: level as u32 });
+        let side = 1 << level;
+        (y..y + side).for_each(|r| left.clear_run(r, x, x + side - 1));
+    };
+    for level in (2..fitting.len()).rev() {
         let side = 1usize << level;
-        if level == 0 {
-            left.for_each(|x, y| squares.push(Square { x: x as u32, y: y as u32, level }));
-            break;
-        }
-        let step = side / 2;
+        let step = if level + 2 > fitting.len() { side / 4 } else if level + 3 > fitting.len() { side / 2 } else { side };
         for y in (0..=mask.height() - side).step_by(step) {
             for x in (0..=mask.width() - side).step_by(step) {
-                let inside = (y..y + side).all(|r| mask.count_run(r, x, x + side - 1) as usize == side);
-                if !inside {
+                if !fitting[level].get(x, y) {
                     continue;
                 }
                 let new: u32 = (y..y + side).map(|r| left.count_run(r, x, x + side - 1)).sum();
                 if 2 * new as usize >= side * side {
-                    squares.push(Square { x: x as u32, y: y as u32, level });
-                    (y..y + side).for_each(|r| left.clear_run(r, x, x + side - 1));
+                    take(&mut left, x, y, level);
                 }
             }
         }
     }
+    for level in (0..fitting.len().min(2)).rev() {
+        let reach = (1usize << level) - 1;
+        let mut seeds = Vec::new();
+        left.for_each(|x, y| seeds.push((x, y)));
+        for (x, y) in seeds {
+            if !left.get(x, y) {
+                continue;
+            }
+            // The later corners first: earlier seeds are covered already.
+            let corners = [(x, y), (x.wrapping_sub(reach), y), (x, y.wrapping_sub(reach)), (x.wrapping_sub(reach), y.wrapping_sub(reach))];
+            let fits = |&(a, b): &(usize, usize)| a < mask.width() && b < mask.height() && fitting[level].get(a, b);
+            if let Some((a, b)) = corners.into_iter().find(fits) {
+                take(&mut left, a, b, level);
+            }
+        }
+    }
     squares
+}
+
+/// For each level, where a square of side 2^level has its lower left corner if it lies in the mask.
+fn fitting_squares(mask: &Mask) -> Vec<Mask> {
+    let mut fitting = vec![mask.clone()];
+    for level in 0..mask.width().min(mask.height()).ilog2() {
+        let next = fitting[level as usize].and_shifted(1 << level);
+        if next.is_empty() {
+            break;
+        }
+        fitting.push(next);
+    }
+    fitting
 }
 
 #[cfg(test)]

@@ -1,91 +1,279 @@
-//! WIP
+//! The greatest density at which all charts fit: a first guess, a bracket, then a search over orders.
+//!
+//! Attempts fill the grid upwards and may overshoot its top, so that each tells *how much* too dense
+//! or too loose it was: area goes with the square of the density, so the next guess is the density
+//! divided by the root of the height used. Near the optimum the height is a noisy function of the
+//! order of placement, and the search climbs on that: variations of the best order so far, at a
+//! density slightly above the best that fitted.
+
 use rayon::prelude::*;
 
 use super::mask::Reach;
+use super::occupancy::Occupancy;
+use super::order::Strategy;
 use super::outline::Outline;
-use super::place::{Goal, Layout, place};
+use super::place::{Layout, place};
 use super::pose::base_turns;
-use super::shape::Shape;
-use super::{PackError, PackItem, PackSettings, Packed, Pose, Rotation};
-use crate::Progress;
+use super::shape::{SAFETY_TEXELS, Shape};
+use super::{PackError, PackSettings, Quality, Rotation};
+use crate::{Progress, Stage};
 
+/// So many of the largest charts are tried in more angles.
+const LARGE: usize = 24;
+/// Attempts in a round while the density is bracketed, when strategies are compared, and in each round
+/// of variations. They run in parallel; fixed, so that results do not depend on the number of threads.
+const BRACKETING: usize = 2;
+const COMPARED: usize = 8;
+const VARIED: usize = 4;
+/// From so many charts on, search rows are shared by similar footprints.
+const MANY: usize = 600;
+/// Attempts made before giving up shrinking; each without a fit takes at least a tenth of the density.
+const SHRINKS: u32 = 80;
+/// Share of the texture charts cover in the first guess, with half a margin around each.
+const FIRST_FILL: f64 = 0.8;
+/// Greatest and least step of density above the best fit.
+const STEP: f64 = 0.003;
+const LEAST_STEP: f64 = 0.0004;
+/// An attempt that uses the height to this share is a start for variations.
+const NEAR: f64 = 0.015;
+/// Rounds without a better fit before the step is halved.
+const PATIENCE: usize = 3;
+
+/// The grid laid over the texture, half a margin from its border.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Order { Area, Extent, Box }
-
-pub(super) struct Attempt { density: f64, shapes: Vec<Shape>, layout: Layout, used: f64 }
-
-pub(super) struct Plan { pub(super) cell: f64, pub(super) goals: Vec<(Goal, Order)>, pub(super) rounds: usize, pub(super) tol: f64 }
-
-pub(super) fn pack(items: &[PackItem<'_>], settings: &PackSettings, progress: &Progress) -> Result<Packed, PackError> {
-    let plan = Plan { cell: 1.0, goals: vec![(Goal::Centre, Order::Area)], rounds: 8, tol: 0.003 };
-    pack_plan(items, settings, &plan, progress)
+pub(super) struct Grid {
+    /// Texels a cell.
+    pub(super) cell: f64,
+    pub(super) columns: usize,
+    pub(super) rows: usize,
 }
 
-pub(super) fn pack_plan(items: &[PackItem<'_>], settings: &PackSettings, plan: &Plan, progress: &Progress) -> Result<Packed, PackError> {
-    let debug = std::env::var("PACKDBG").is_ok();
-    let outlines: Vec<Outline> = items.par_iter().enumerate().map(|(i, item)| Outline::new(item, i)).collect::<Result<_, _>>()?;
+/// The best placement found.
+pub(super) struct Best {
+    pub(super) shapes: Vec<Shape>,
+    pub(super) layout: Layout,
+    /// Texels to a unit of the chart plane.
+    pub(super) density: f64,
+}
+
+impl Grid {
+    /// Cells fine enough for `charts` charts; where there is a margin, a whole number of cells make it.
+    fn new(settings: &PackSettings, charts: usize) -> Result<Self, PackError> {
+        let (width, height) = (f64::from(settings.width), f64::from(settings.height));
+        let margin = settings.margin_texels;
+        let inner = width.min(height) - margin;
+        // A texel must be left for the chart.
+        if !(inner >= 1.0) {
+            return Err(PackError::MarginTooLarge { margin, width: settings.width, height: settings.height });
+        }
+        // About 100 cells across a chart: the raster then wastes 1 %; below 1024 rows time hardly falls.
+        let (least, most) = match settings.quality {
+            Quality::Fast => (1024.0, 2048.0),
+            Quality::High => (2048.0, 4096.0),
+        };
+        let across = (std::env::var("KK").map_or(100.0,|v|v.parse::<f64>().unwrap()) * (charts as f64).sqrt()).clamp(least, most);
+        let larger = width.max(height);
+        // Quarter texels at the finest.
+        let mut cell = (larger / across).max(0.25);
+        if margin > 0.0 {
+            cell = if margin >= cell { margin / (margin / cell - 1e-9).ceil() } else { margin };
+        }
+        cell = cell.max(larger / Occupancy::WIDEST as f64).min(inner);
+        let cells = |size: f64| (((size - margin) / cell + 1e-9).floor() as usize).max(1);
+        Ok(Self { cell, columns: cells(width), rows: cells(height) })
+    }
+}
+
+/// What a search needs to know, fixed throughout.
+struct Search<'a> {
+    outlines: &'a [Outline],
+    turns: Vec<Vec<[f64; 2]>>,
+    quarters: bool,
+    grid: Grid,
+    reach: Reach,
+    progress: &'a Progress,
+}
+
+/// One attempt's outcome: height used over height there is, and the layout.
+struct Attempt {
+    used: f64,
+    layout: Layout,
+    strategy: Strategy,
+}
+
+impl Search<'_> {
+    fn shapes(&self, density: f64) -> Vec<Shape> {
+        let shape = |i: usize| Shape::new(&self.outlines[i], &self.turns[i], self.quarters, density, self.grid.cell);
+        (0..self.outlines.len()).into_par_iter().map(shape).collect()
+    }
+
+    /// Tries all strategies; the one that uses least height, ties by index.
+    fn best_of(&self, shapes: &[Shape], strategies: Vec<Strategy>) -> Result<Option<Attempt>, PackError> {
+        let Grid { columns, rows, .. } = self.grid;
+        let cap = rows + rows / 2;
+        let cells: usize = shapes.iter().map(|s| s.cells).sum();
+        let alike = shapes.len() >= MANY;
+        let attempt = |strategy: Strategy| {
+            let order = strategy.order();
+            let layout = place(shapes, &order, [columns, cap], &self.reach, strategy.goal, alike, self.progress)?;
+            let used = if layout.missing == 0 {
+                layout.rows as f64 / rows as f64
+            } else {
+                1.5 * cells as f64 / (cells - layout.missing).max(cells / 100 + 1) as f64
+            };
+            Ok(Attempt { used, layout, strategy })
+        };
+        let all: Vec<Attempt> = strategies.into_par_iter().map(attempt).collect::<Result<_, PackError>>()?;
+        Ok(all.into_iter().reduce(|a, b| if b.used < a.used { b } else { a }))
+    }
+}
+
+/// Places outlines at the greatest density found.
+///
+/// # Errors
+/// [`PackError::MarginTooLarge`], [`PackError::TooManyCharts`], [`PackError::Cancelled`].
+pub(super) fn densest(
+    outlines: &[Outline], settings: &PackSettings, progress: &Progress,
+) -> Result<(Best, Grid), PackError> {
     let n = outlines.len();
+    let grid = Grid::new(settings, n)?;
+    let largest = outlines.iter().map(|o| o.extent).fold(0.0, f64::max);
+    let area = |i: usize| outlines[i].area * (outlines[i].extent / largest).powi(2);
     let mut by_area: Vec<usize> = (0..n).collect();
-    let area = |i: usize| outlines[i].area * outlines[i].unit().powi(2);
     by_area.sort_by(|&a, &b| area(b).total_cmp(&area(a)).then(a.cmp(&b)));
     let mut large = vec![false; n];
-    by_area.iter().take(24).for_each(|&i| large[i] = true);
-    let turns: Vec<_> = (0..n).into_par_iter().map(|i| base_turns(&outlines[i], settings.rotation, large[i], n == 1)).collect();
-    let cell = plan.cell;
-    let border = 0.5 * settings.margin_texels;
-    let cols = ((f64::from(settings.width) - 2.0 * border) / cell).floor() as usize;
-    let rows = ((f64::from(settings.height) - 2.0 * border) / cell).floor() as usize;
-    let reach = Reach::new(settings.margin_texels / cell);
-    let slope = rows as f64 / cols as f64;
-    let cap = rows + rows / 2;
-    let total: f64 = (0..n).map(area).sum();
-    let full = f64::from(settings.width) * f64::from(settings.height);
-    let mut density = (0.7 * full / total).sqrt();
-    let mut low: Option<Attempt> = None;
-    let mut high = f64::INFINITY;
-    for round in 0..plan.rounds {
-        let t0 = std::time::Instant::now();
-        let shapes: Vec<Shape> = (0..n).into_par_iter().map(|i| Shape::new(&outlines[i], &turns[i], settings.rotation != Rotation::None, density, cell)).collect();
-        let t1 = t0.elapsed();
-        let results: Vec<Layout> = plan.goals.par_iter().map(|&(goal, order)| {
-            let mut ids: Vec<usize> = (0..n).collect();
-            let key = |i: usize| { let f = &shapes[i].footprints[0].mask; match order {
-                Order::Area => shapes[i].cells, Order::Extent => f.width().max(f.height()), Order::Box => f.width()*f.height() } };
-            ids.sort_by(|&a, &b| key(b).cmp(&key(a)).then(shapes[b].cells.cmp(&shapes[a].cells)).then(a.cmp(&b)));
-            place(&shapes, &ids, cols, cap, slope, &reach, goal, progress)
-        }).collect::<Result<_, _>>()?;
-        let cells: usize = shapes.iter().map(|s| s.cells).sum();
-        let used = |l: &Layout| if l.missing > 0 { cap as f64 / rows as f64 * cells as f64 / (cells - l.missing).max(1) as f64 } else { l.rows as f64 / rows as f64 };
-        let all: Vec<f64> = results.iter().map(used).collect();
-        let k = (0..all.len()).min_by(|&a, &b| all[a].total_cmp(&all[b])).unwrap_or(0);
-        let u = all[k];
-        if debug {
-            eprintln!("round {round} density {density:.5} eff {:.4} -> {all:.3?} build {t1:?} place {:?}", total * density * density / full, t0.elapsed() - t1);
-        }
-        let layout = results.into_iter().nth(k).ok_or(PackError::Full)?;
-        if u <= 1.0 {
-            if low.as_ref().is_none_or(|l| l.density < density) { low = Some(Attempt { density, shapes, layout, used: u }); }
-        } else { high = high.min(density); }
-        let guess = density / u.sqrt();
-        match &low {
-            Some(l) if high.is_finite() => {
-                if high / l.density < 1.0 + plan.tol { break; }
-                let (a, b) = (l.density * (high / l.density).powf(0.2), l.density * (high / l.density).powf(0.7));
-                density = guess.clamp(a, b);
-            }
-            Some(_) => density = guess * 1.003,
-            None => density = guess * 0.997,
-        }
+    by_area.iter().take(LARGE).for_each(|&i| large[i] = true);
+    let turns = |i: usize| base_turns(&outlines[i], settings.rotation, large[i], n == 1);
+    let search = Search {
+        outlines,
+        turns: (0..n).into_par_iter().map(turns).collect(),
+        quarters: settings.rotation != Rotation::None,
+        grid,
+        reach: Reach::new(settings.margin_texels / grid.cell),
+        progress,
+    };
+    if !(largest > 0.0) {
+        return search.without_extent(settings);
     }
-    let best = low.ok_or(PackError::Full)?;
-    let poses: Vec<Pose> = (0..n).map(|i| { let at = best.layout.placed[i].ok_or(PackError::Full)?; Ok(best.shapes[i].footprints[at.footprint].pose(at.x, at.y, cell, border)) }).collect::<Result<_, PackError>>()?;
-    let _ = best.used;
-    Ok(Packed { poses, efficiency: total * best.density * best.density / full, texels_per_unit: best.density, specks: best.shapes.iter().filter(|s| s.is_speck).count(), size: [settings.width, settings.height] })
+    // From here on densities are texels to the largest extent: no overflow at any scale of input.
+    let ceiling = f64::from(settings.width).hypot(f64::from(settings.height));
+    let mut density = first_guess((0..n).map(area), settings, grid).min(ceiling);
+    let budget = attempts(n, grid, settings.quality);
+    let mut made = 0;
+    let mut best: Option<(f64, Best)> = None;
+    let mut lead: Option<(f64, Strategy)> = None;
+    let mut too_dense = f64::INFINITY;
+    let mut near = false;
+    let (mut step, mut idle, mut shrinks) = (STEP, 0, 0);
+    let mut shapes = search.shapes(density / largest);
+    while made < budget && shrinks < SHRINKS {
+        progress.advance(Stage::Pack, made as f64 / budget as f64);
+        let strategies = match &lead {
+            None => Strategy::portfolio(&shapes, if n == 1 { 1 } else if near { COMPARED } else { BRACKETING }),
+            Some((used, lead)) => {
+                let keep = used.is_infinite().then(|| lead.clone());
+                let varied = (0..VARIED - usize::from(keep.is_some())).map(|k| lead.varied((made + k) as u64));
+                varied.chain(keep).collect()
+            }
+        };
+        let count = strategies.len();
+        let Some(Attempt { used, layout, strategy }) = search.best_of(&shapes, strategies)? else { break };
+        let before = density;
+        if std::env::var("PACKDBG").is_ok() { eprintln!("made {made}+{count} d {density:.3} used {used:.4} step {step} lead {:?} cell {} budget {budget}", lead.as_ref().map(|l| l.0), grid.cell); }
+        if used <= 1.0 {
+            // Every density tried lies above the best that fitted: this one is better.
+            best = Some((density, Best { shapes, layout, density: density / largest }));
+            near = used > 1.0 - 2.0 * NEAR;
+            if used > 1.0 - NEAR && count > BRACKETING {
+                lead = Some((f64::INFINITY, strategy));
+            }
+            (step, idle) = ((2.0 * step).min(STEP), 0);
+            density = (density / used.sqrt() * (1.0 + step)).min(ceiling);
+            // While bracketing, do not go back to what was too dense.
+            if lead.is_none() && before < too_dense && density >= too_dense {
+                density = (before * too_dense).sqrt();
+            }
+        } else if let Some((fitted, _)) = &best {
+            near = true;
+            if used < 1.0 + NEAR && count > BRACKETING && lead.as_ref().is_none_or(|l| used <= l.0) {
+                lead = Some((used, strategy));
+            }
+            idle += 1;
+            if idle < PATIENCE && lead.is_some() {
+                made += count;
+                continue;
+            }
+            (step, idle) = ((0.5 * step).max(LEAST_STEP), 0);
+            too_dense = density;
+            let nearer = (fitted * density).sqrt().min(fitted * (1.0 + 4.0 * step));
+            density = nearer.max(fitted * (1.0 + LEAST_STEP));
+            lead = lead.map(|l| (f64::INFINITY, l.1));
+        } else {
+            // Not a part of the search yet.
+            if shapes.iter().all(|s| s.is_speck || s.footprints.is_empty()) {
+                break;
+            }
+            too_dense = density;
+            shrinks += 1;
+            density *= (0.998 / used.sqrt()).clamp(0.5, 0.995 - 0.01 * f64::from(shrinks.min(9)));
+            shapes = search.shapes(density / largest);
+            continue;
+        }
+        made += count;
+        if density == before {
+            break;
+        }
+        shapes = search.shapes(density / largest);
+    }
+    let too_many = PackError::TooManyCharts { charts: n, margin: settings.margin_texels, width: settings.width, height: settings.height };
+    Ok((best.ok_or(too_many)?.1, grid))
 }
 
+/// How many attempts the search may make.
+fn attempts(charts: usize, grid: Grid, quality: Quality) -> usize {
+    if charts == 1 {
+        return 24;
+    }
+    // Measured: an attempt costs about so much, in 10 µs on one core.
+    let cost = charts as f64 * grid.rows.max(grid.columns) as f64 / 1.5e5;
+    let (work, least, most) = match quality {
+        Quality::Fast => (std::env::var("WW").map_or(80.0,|v|v.parse::<f64>().unwrap()), 16.0, 64.0),
+        Quality::High => (800.0, 64.0, 800.0),
+    };
+    (work / cost).clamp(least, most) as usize
+}
+
+impl Search<'_> {
+    /// Points only: each gets a cell, the density means nothing.
+    fn without_extent(&self, settings: &PackSettings) -> Result<(Best, Grid), PackError> {
+        let shapes = self.shapes(1.0);
+        let attempt = self.best_of(&shapes, Strategy::portfolio(&shapes, 1))?;
+        let n = shapes.len();
+        match attempt {
+            Some(a) if a.used <= 1.0 => Ok((Best { shapes, layout: a.layout, density: 1.0 }, self.grid)),
+            _ => Err(PackError::TooManyCharts { charts: n, margin: settings.margin_texels, width: settings.width, height: settings.height }),
+        }
+    }
+}
+
+/// Density at which squares of the charts' areas, with margin and raster waste added, cover
+/// [`FIRST_FILL`] of the texture.
+fn first_guess(areas: impl Iterator<Item = f64>, settings: &PackSettings, grid: Grid) -> f64 {
+    let gap = settings.margin_texels + grid.cell + 2.0 * SAFETY_TEXELS;
+    let (mut a, mut b, mut c) = (0.0, 0.0, -FIRST_FILL * f64::from(settings.width) * f64::from(settings.height));
+    for area in areas {
+        a += area;
+        b += gap * area.sqrt();
+        c += gap * gap;
+    }
+    // a s² + 2 b s + c = 0. Without room for the gaps alone, or without area, start small.
+    let root = (b * b - a * c).max(0.0).sqrt() - b;
+    if root > 0.0 && a > 0.0 { root / a } else { 1.0 }
+}
 #[cfg(test)]
 mod scratch {
     use super::*;
+    use crate::packing::PackItem;
     use nalgebra::Point2;
     fn load(path: &str) -> Vec<(Vec<Point2<f64>>, Vec<[u32; 3]>)> {
         let text = std::fs::read_to_string(path).unwrap();
@@ -107,13 +295,9 @@ mod scratch {
         let mut s = PackSettings::default();
         let get = |k: &str, d: f64| std::env::var(k).ok().map_or(d, |v| v.parse().unwrap());
         s.width = get("SIZE", 1024.0) as u32; s.height = s.width; s.margin_texels = get("MARGIN", 2.0);
-        let goals = std::env::var("GOALS").unwrap_or("TA".into()).split(',').map(|g| {
-            let b = g.as_bytes();
-            (match b[0] { b'T' => Goal::Top, b'G' => Goal::Centre, b'M' => Goal::Mixed, _ => Goal::Corner }, match b[1] { b'A' => Order::Area, b'E' => Order::Extent, _ => Order::Box })
-        }).collect();
-        let plan = Plan { cell: get("CELL", 1.0), goals, rounds: get("ROUNDS", 8.0) as usize, tol: 0.003 };
+        if std::env::var("HIGH").is_ok() { s.quality = Quality::High; }
         let t = std::time::Instant::now();
-        let r = pack_plan(&items, &s, &plan, &Progress::new()).unwrap();
+        let r = crate::packing::pack(&items, &s, &Progress::new()).unwrap();
         eprintln!("{path} charts {} eff {:.4} specks {} time {:.3}", items.len(), r.efficiency, r.specks, t.elapsed().as_secs_f64());
         if let Ok(out) = std::env::var("PACKOUT") {
             let mut o = String::new();

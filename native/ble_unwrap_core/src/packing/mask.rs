@@ -82,29 +82,56 @@ impl Mask {
     }
 
     /// Removes the cells `from..=to` of row `y`.
+    #[inline]
     pub(super) fn clear_run(&mut self, y: usize, from: usize, to: usize) {
         let (a, b) = (from >> 6, to >> 6);
         let row = self.row_mut(y);
-        for (w, word) in row.iter_mut().enumerate().take(b + 1).skip(a) {
-            *word &= !span(if w == a { from & 63 } else { 0 }, if w == b { to & 63 } else { 63 });
+        if a == b {
+            row[a] &= !span(from & 63, to & 63);
+            return;
         }
+        row[a] &= !span(from & 63, 63);
+        row[a + 1..b].fill(0);
+        row[b] &= !span(0, to & 63);
     }
 
     /// Number of cells of row `y` within `from..=to`.
+    #[inline]
     pub(super) fn count_run(&self, y: usize, from: usize, to: usize) -> u32 {
         let (a, b) = (from >> 6, to >> 6);
         let row = self.row(y);
-        (a..=b)
-            .map(|w| {
-                let keep = span(if w == a { from & 63 } else { 0 }, if w == b { to & 63 } else { 63 });
-                (row[w] & keep).count_ones()
-            })
-            .sum()
+        if a == b {
+            return (row[a] & span(from & 63, to & 63)).count_ones();
+        }
+        let ends = (row[a] & span(from & 63, 63)).count_ones() + (row[b] & span(0, to & 63)).count_ones();
+        row[a + 1..b].iter().fold(ends, |n, w| n + w.count_ones())
     }
 
     /// Number of cells.
     pub(super) fn count(&self) -> usize {
         self.words.iter().map(|w| w.count_ones() as usize).sum()
+    }
+
+    /// Whether no cell is in.
+    pub(super) fn is_empty(&self) -> bool {
+        self.words.iter().all(|&w| w == 0)
+    }
+
+    /// The cells (x, y) for which (x, y), (x + by, y), (x, y + by) and (x + by, y + by) all are in.
+    pub(super) fn and_shifted(&self, by: usize) -> Self {
+        let mut out = Self::new(self.width, self.height);
+        let mut pair = vec![0; self.stride];
+        for y in 0..self.height.saturating_sub(by) {
+            for (p, (&a, &b)) in pair.iter_mut().zip(self.row(y).iter().zip(self.row(y + by))) {
+                *p = a & b;
+            }
+            out.row_mut(y).copy_from_slice(&pair);
+            shift_down(&mut pair, by);
+            for (o, &p) in out.row_mut(y).iter_mut().zip(&pair) {
+                *o &= p;
+            }
+        }
+        out
     }
 
     /// Calls `f` with every cell, row by row.
@@ -123,7 +150,19 @@ impl Mask {
     /// The mask turned a quarter counter-clockwise: cell (x, y) goes to (h − 1 − y, x).
     pub(super) fn quarter_turn(&self) -> Self {
         let mut turned = Self::new(self.height, self.width);
-        self.for_each(|x, y| turned.set(self.height - 1 - y, x));
+        let mut block = [0u64; 64];
+        for y0 in (0..turned.stride).map(|w| 64 * w) {
+            // Columns y0..y0 + 64 of the turned mask are rows h−1−y0, h−2−y0, … of this one.
+            for w in 0..self.stride {
+                for (i, b) in block.iter_mut().enumerate() {
+                    *b = (self.height.checked_sub(1 + y0 + i)).map_or(0, |y| self.words[y * self.stride + w]);
+                }
+                transpose(&mut block);
+                for (i, &b) in block.iter().enumerate().take(self.width - 64 * w) {
+                    turned.words[(64 * w + i) * turned.stride + (y0 >> 6)] = b;
+                }
+            }
+        }
         turned
     }
 
@@ -147,7 +186,7 @@ impl Mask {
                     }
                     Some(before) if before < dx => {
                         // Centred on the same cells: start 'dx − before' further left.
-                        shift_left_down(&mut wide, dx - before);
+                        shift_down(&mut wide, dx - before);
                         spread_right(&mut wide, 2 * (dx - before));
                     }
                     Some(_) => {}
@@ -161,6 +200,24 @@ impl Mask {
             }
         }
         out
+    }
+}
+
+/// Transposes a block of 64 by 64 bits: bit j of word i goes to bit i of word j. Warren: Hacker's
+/// Delight, second edition, 2012, section 7-3.
+fn transpose(block: &mut [u64; 64]) {
+    let mut half = 32;
+    let mut low = !0u64 >> 32;
+    while half > 0 {
+        let mut k = 0;
+        while k < 64 {
+            let swap = (block[k] >> half ^ block[k + half]) & low;
+            block[k] ^= swap << half;
+            block[k + half] ^= swap;
+            k = (k + half + 1) & !half;
+        }
+        half >>= 1;
+        low ^= low << half;
     }
 }
 
@@ -197,7 +254,7 @@ fn spread_right(row: &mut [u64], by: usize) {
 }
 
 /// Moves every bit `by` places towards lower indices.
-fn shift_left_down(row: &mut [u64], by: usize) {
+fn shift_down(row: &mut [u64], by: usize) {
     let (skip, shift) = (by >> 6, by & 63);
     for w in 0..row.len() {
         let low = row.get(w + skip).copied().unwrap_or(0);

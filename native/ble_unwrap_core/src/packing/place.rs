@@ -14,10 +14,8 @@ pub(super) enum Goal {
     Top,
     /// Lowest centre of gravity, then least x.
     Centre,
-    /// Least growth of the used rectangle, measured along the grid's diagonal.
-    Corner,
-    /// Mean
-    Mixed,
+    /// Least mean of the two.
+    Middle,
 }
 
 /// Where a shape went.
@@ -41,15 +39,36 @@ pub(super) struct Layout {
 
 impl Goal {
     #[inline]
-    fn cost(self, f: &Footprint, x: usize, y: usize, slope: f64) -> f64 {
-        let (x, y) = (x as f64, y as f64);
-        let (w, h) = (f.mask.width() as f64, f.mask.height() as f64);
-        match self {
-            Self::Top => (y + h) * 8192.0 + x,
-            Self::Centre => (y + f.centre_y) * 8192.0 + x,
-            Self::Mixed => (y + 0.5 * (h + f.centre_y)) * 8192.0 + x,
-            Self::Corner => ((x + w) * slope).max(y + h) * 8192.0 + x + y,
+    fn cost(self, f: &Footprint, x: usize, y: usize) -> f64 {
+        let top = f.mask.height() as f64;
+        let above = match self {
+            Self::Top => top,
+            Self::Centre => f.centre_y,
+            Self::Middle => 0.5 * (top + f.centre_y),
+        };
+        // A row outweighs all columns.
+        (y as f64 + above) * (2 * Occupancy::WIDEST) as f64 + x as f64
+    }
+}
+
+/// Footprints that share the row where their search begins.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Kind<'a> {
+    /// The same cells: where one found no place, nor does another.
+    Same(&'a Mask),
+    /// Width, height and share of cells to about an eighth: nearly so.
+    Alike(usize, usize, usize),
+}
+
+impl<'a> Kind<'a> {
+    fn of(f: &'a Footprint, alike: bool) -> Self {
+        if !alike {
+            return Self::Same(&f.mask);
         }
+        // Steps of an eighth of the next lower power of two.
+        let coarse = |n: usize| n >> n.ilog2().saturating_sub(3) << n.ilog2().saturating_sub(3);
+        let (w, h) = (f.mask.width(), f.mask.height());
+        Self::Alike(coarse(w), coarse(h), 8 * f.cells / (w * h))
     }
 }
 
@@ -58,7 +77,7 @@ const SUMMARISED: usize = 4;
 
 /// Best free position of a footprint cheaper than `limit`, and the first row that may have a free one.
 fn best_position(
-    grid: &Occupancy, f: &Footprint, goal: Goal, slope: f64, first_row: usize, limit: f64,
+    grid: &Occupancy, f: &Footprint, goal: Goal, first_row: usize, limit: f64,
 ) -> (Option<(f64, usize, usize)>, usize) {
     let (w, h) = (f.mask.width(), f.mask.height());
     if w > grid.width() || h > grid.height() {
@@ -70,12 +89,12 @@ fn best_position(
     let mut limit = limit;
     let mut first = None;
     let mut y = first_row;
-    while y + h <= grid.height() && goal.cost(f, 0, y, slope) < limit {
+    while y + h <= grid.height() && goal.cost(f, 0, y) < limit {
         let mut words = f.squares.iter().take(SUMMARISED).fold(within, |words, &q| words & grid.open_words(q, y));
         while words != 0 {
             let word = words.trailing_zeros() as usize;
             words &= words - 1;
-            if goal.cost(f, 64 * word, y, slope) >= limit {
+            if goal.cost(f, 64 * word, y) >= limit {
                 first = first.or(Some(y));
                 break;
             }
@@ -89,7 +108,7 @@ fn best_position(
             if blocked != !0 {
                 first = first.or(Some(y));
                 let x = 64 * word + (!blocked).trailing_zeros() as usize;
-                let cost = goal.cost(f, x, y, slope);
+                let cost = goal.cost(f, x, y);
                 if cost < limit {
                     limit = cost;
                     best = Some((cost, x, y));
@@ -109,7 +128,8 @@ fn best_position(
 /// # Errors
 /// [`Cancelled`].
 pub(super) fn place(
-    shapes: &[Shape], order: &[usize], width: usize, height: usize, slope: f64, reach: &Reach, goal: Goal, progress: &Progress,
+    shapes: &[Shape], order: &[usize], [width, height]: [usize; 2], reach: &Reach, goal: Goal, alike: bool,
+    progress: &Progress,
 ) -> Result<Layout, Cancelled> {
     // Highest level still asked about, from each place in the order on.
     let mut top_from = vec![0u32; order.len() + 1];
@@ -120,14 +140,14 @@ pub(super) fn place(
     let mut grid = Occupancy::new(width, height, top_from[0]);
     let mut layout = Layout { placed: vec![None; shapes.len()], rows: 0, missing: 0 };
     // Space only gets less: a footprint seen before has no place below the row where it last had one.
-    let mut first_rows: HashMap<&Mask, usize> = HashMap::new();
+    let mut first_rows: HashMap<Kind<'_>, usize> = HashMap::new();
     for (k, &i) in order.iter().enumerate() {
         progress.check()?;
         let mut best: Option<(f64, Placed)> = None;
         for (n, f) in shapes[i].footprints.iter().enumerate() {
-            let first_row = first_rows.entry(&f.mask).or_insert(0);
+            let first_row = first_rows.entry(Kind::of(f, alike)).or_insert(0);
             let limit = best.map_or(f64::INFINITY, |b| b.0);
-            let (found, first) = best_position(&grid, f, goal, slope, *first_row, limit);
+            let (found, first) = best_position(&grid, f, goal, *first_row, limit);
             *first_row = first;
             if let Some((cost, x, y)) = found {
                 best = Some((cost, Placed { footprint: n, x, y }));

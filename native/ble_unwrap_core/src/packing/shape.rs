@@ -26,6 +26,8 @@ const BOX_CELLS: usize = 6;
 pub(super) struct Footprint {
     pub(super) mask: Mask,
     pub(super) squares: Vec<Square>,
+    /// Number of its cells.
+    pub(super) cells: usize,
     /// Mean row of its cells.
     pub(super) centre_y: f64,
     /// Chart plane to cells of the mask.
@@ -51,7 +53,8 @@ impl Shape {
         // Cells to an outline unit; a chart without extent is a point at any scale.
         let scale = if outline.extent == 0.0 { density } else { extent.max(SPECK_TEXELS) } / cell;
         let mut footprints: Vec<Footprint> = Vec::new();
-        for &turn in turns {
+        // Without triangles there is nothing to place.
+        for &turn in turns.iter().filter(|_| !outline.edges.is_empty()) {
             let raster = rasterise(outline, turn, scale, SAFETY_TEXELS / cell);
             let mut mask = raster.mask;
             let tiny = mask.width().max(mask.height()) <= BOX_CELLS;
@@ -73,13 +76,7 @@ impl Shape {
                     mask = mask.quarter_turn();
                 }
                 if !footprints.iter().any(|f| f.mask == mask) {
-                    let (mut sum, mut count) = (0.0, 0.0);
-                    for y in 0..mask.height() {
-                        let n: u32 = mask.row(y).iter().map(|w| w.count_ones()).sum();
-                        sum += (y as f64 + 0.5) * f64::from(n);
-                        count += f64::from(n);
-                    }
-                    footprints.push(Footprint { mask: mask.clone(), squares: squares.clone(), centre_y: sum / count, to_cells });
+                    footprints.push(Footprint::new(mask.clone(), squares.clone(), to_cells));
                 }
                 if tiny || !quarters {
                     break;
@@ -89,12 +86,22 @@ impl Shape {
                 break;
             }
         }
-        let cells = footprints.first().map_or(0, |f| f.mask.count());
+        let cells = footprints.first().map_or(0, |f| f.cells);
         Self { footprints, cells, is_speck }
     }
 }
 
 impl Footprint {
+    fn new(mask: Mask, squares: Vec<Square>, to_cells: Pose) -> Self {
+        let (mut moment, mut cells) = (0.0, 0);
+        for y in 0..mask.height() {
+            let count: usize = mask.row(y).iter().map(|w| w.count_ones() as usize).sum();
+            moment += (y as f64 + 0.5) * count as f64;
+            cells += count;
+        }
+        Self { mask, squares, cells, centre_y: moment / cells.max(1) as f64, to_cells }
+    }
+
     /// Chart plane to texels with the mask's corner at cell (x, y), cells of `cell` texels, and the
     /// grid's corner at `border` texels.
     pub(super) fn pose(&self, x: usize, y: usize, cell: f64, border: f64) -> Pose {

@@ -44,7 +44,7 @@ pub(super) fn finish(
         let layout = Layout::new(input, surface, &charts, settings, progress)?;
         clock.lap("pack");
         progress.enter(Stage::Verify);
-        let mesh = arrays.uv_mesh(&layout, settings);
+        let mesh = arrays.uv_mesh(&layout, settings)?;
         let certificate = verify::verify(&mesh, &surface.reversed, progress)?;
         let faulty: BTreeSet<usize> =
             certificate.faulty_charts.iter().filter_map(|&c| usize::try_from(c).ok()).collect();

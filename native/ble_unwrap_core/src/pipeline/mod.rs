@@ -16,8 +16,8 @@ use std::time::Instant;
 use crate::charts::Patch;
 use crate::error::UnwrapError;
 use crate::mesh::{self, ConditionOptions, MeshInput};
-use crate::metrics::Report;
 use crate::progress::{Progress, Stage};
+use crate::report::Report;
 use crate::settings::Settings;
 
 pub use rungs::{Rung, Rungs};

@@ -9,7 +9,7 @@ use crate::linalg::{Mds, classical_mds};
 use crate::mesh::{TriMesh, measure};
 use crate::progress::{Cancelled, Progress};
 
-use super::min_cut::CutGraph;
+use super::CutGraph;
 use super::polygon_graph::PolygonGraph;
 
 /// Capacities are integers, so that the cut does not depend on the order of sums; a side of mean
@@ -37,7 +37,7 @@ pub(super) fn improve(
         for b in a + 1..parts.len() {
             progress.check()?;
             let pair = Pair { mesh, graph, distances, bends: &bends, number: [a, b], parts: [&parts[a], &parts[b]] };
-            pair.improve(band, crease_weight, label);
+            pair.improve(band, crease_weight, label, progress)?;
         }
     }
     Ok(())
@@ -140,7 +140,13 @@ struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    fn improve(&self, band: f64, crease_weight: f64, label: &mut [u32]) {
+    fn improve(
+        &self,
+        band: f64,
+        crease_weight: f64,
+        label: &mut [u32],
+        progress: &Progress,
+    ) -> Result<(), Cancelled> {
         let [a, b] = self.number.map(|n| u32::try_from(n).unwrap_or(0));
         // −1 at the first representative, 0 on the bisector, 1 at the second.
         let balance = |p: usize| {
@@ -153,7 +159,7 @@ impl Pair<'_> {
         let beyond = |p: usize| if label[p] == a { b } else { a };
         let touches = |p: usize| self.graph.links.group(p).iter().any(|l| label[l.to as usize] == beyond(p));
         if !nodes.iter().any(|&p| touches(p)) {
-            return;
+            return Ok(());
         }
         let mut node = vec![usize::MAX; self.graph.len()];
         for (i, &p) in nodes.iter().enumerate() {
@@ -181,15 +187,16 @@ impl Pair<'_> {
                         cut.add_edge(i, node[q], capacity);
                     }
                 } else if label[q] == a {
-                    cut.add_terminal(i, capacity, 0);
+                    cut.add_terminals(i, capacity, 0);
                 } else if label[q] == b {
-                    cut.add_terminal(i, 0, capacity);
+                    cut.add_terminals(i, 0, capacity);
                 }
             }
         }
-        for (&p, on_side_of_a) in nodes.iter().zip(cut.min_cut()) {
+        for (&p, on_side_of_a) in nodes.iter().zip(cut.min_cut(progress)?) {
             label[p] = if on_side_of_a { a } else { b };
         }
+        Ok(())
     }
 }
 

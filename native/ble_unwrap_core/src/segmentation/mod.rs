@@ -14,7 +14,7 @@
 
 mod boundary;
 mod grow;
-pub mod min_cut;
+mod min_cut;
 mod polygon_graph;
 mod repair;
 mod spectral;
@@ -23,6 +23,7 @@ use crate::geodesics::LandmarkDistances;
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
 
+pub use min_cut::CutGraph;
 use polygon_graph::PolygonGraph;
 pub use spectral::SpectralAnalysis;
 

@@ -1,0 +1,226 @@
+"""Settings and arrays in, plain results out: alone imports `ble_unwrap_native`, and knows nothing of Blender."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+# Slack of the certificate for what float32 coordinates cannot express.
+MARGIN_SLACK_TEXELS = 0.01
+STRETCH_SLACK = 1e-3
+
+# Settings whose 0 in the panel is the native module's None.
+ZERO_IS_AUTOMATIC = ("landmark_max", "kernel_width")
+
+NATIVE_NAME = "ble_unwrap_native"
+
+
+class EngineMissing(Exception):
+    """The native library cannot be loaded; the text says what to do."""
+
+
+class EngineError(Exception):
+    """The native library refused or failed; the text is its own."""
+
+
+class EngineCancelled(Exception):
+    """The computation was cancelled; nothing came of it."""
+
+
+@dataclass
+class Result:
+    """An unwrapped mesh: one UV per corner, a chart per face, and the native report."""
+
+    uv: np.ndarray  # (c, 2) float32
+    chart: np.ndarray  # (f,) int32
+    report: dict
+
+
+@dataclass
+class Certificate:
+    """What was measured, and which promises it breaks (none, as a rule)."""
+
+    measured: dict
+    violations: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def holds(self):
+        return not self.violations
+
+
+def native():
+    """The native module; loaded on first use, so that the add-on registers without it."""
+    try:
+        import ble_unwrap_native
+    except ImportError as error:
+        raise EngineMissing(
+            f"The native library of BLE Unwrap cannot be loaded ({error}). Install the add-on from its zip file, which "
+            f"holds the library for your system, or `pip install {NATIVE_NAME}` for Blender as a Python module"
+        ) from error
+    return ble_unwrap_native
+
+
+def version():
+    """Version of the native library, or None."""
+    try:
+        return getattr(native(), "__version__", None)
+    except EngineMissing:
+        return None
+
+
+def default_settings(preset):
+    """The native module's own values of a preset, in its words."""
+    return dict(native().default_settings(preset.lower()))
+
+
+def native_settings(settings):
+    """Settings in the native module's words: enum values in lower case, bridge settings left out by the caller."""
+    result = {}
+    for name, value in settings.items():
+        if isinstance(value, str):
+            value = value.lower()
+        elif name in ZERO_IS_AUTOMATIC and value == 0:
+            value = None
+        elif name == "texture_size" and not isinstance(value, int):
+            value = tuple(value)
+        result[name] = value
+    return result
+
+
+def _arguments(selection, settings, use_seams):
+    return (
+        (selection.positions, selection.corner_vertices, selection.face_offsets),
+        {
+            "corner_triangles": selection.corner_triangles,
+            "seams": selection.seams if use_seams and len(selection.seams) else None,
+            **native_settings(settings),
+        },
+    )
+
+
+def _translated(call, *arguments, **keywords):
+    """Calls into the native module and turns its exceptions into ours."""
+    module = native()
+    try:
+        return call(module, *arguments, **keywords)
+    except module.Cancelled as error:
+        raise EngineCancelled(str(error) or "cancelled") from error
+    except module.BleUnwrapError as error:
+        raise EngineError(str(error)) from error
+    except (TypeError, ValueError, MemoryError, RuntimeError) as error:
+        raise EngineError(f"{type(error).__name__}: {error}") from error
+
+
+def _result(atlas):
+    return Result(np.asarray(atlas.uv, np.float32), np.asarray(atlas.chart, np.int32), dict(atlas.report))
+
+
+def unwrap(selection, settings, *, use_seams=False):
+    """Unwraps at once. Raises `EngineMissing`, `EngineError`."""
+    positional, keywords = _arguments(selection, settings, use_seams)
+    return _result(_translated(lambda module: module.unwrap(*positional, **keywords)))
+
+
+class Job:
+    """An unwrap on the native module's own thread."""
+
+    def __init__(self, selection, settings, *, use_seams=False):
+        positional, keywords = _arguments(selection, settings, use_seams)
+        self._job = _translated(lambda module: module.submit_unwrap(*positional, **keywords))
+
+    def progress(self):
+        """Share of the work done, 0 to 1."""
+        return float(self._job.progress())
+
+    def stage(self):
+        """What is being done, in a word or two."""
+        return str(self._job.stage()).replace("_", " ")
+
+    def is_finished(self):
+        return bool(self._job.is_finished())
+
+    def cancel(self):
+        self._job.cancel()
+
+    def result(self):
+        """The result of a finished job. Raises `EngineError`, `EngineCancelled`."""
+        return _result(_translated(lambda module: self._job.result()))
+
+
+def measure(selection, uv, *, texture_size, margin):
+    """Measures any UVs of a selection, whoever made them; the keys of the native report."""
+    size = texture_size if isinstance(texture_size, int) else tuple(texture_size)
+    return dict(
+        _translated(
+            lambda module: module.measure(
+                selection.positions,
+                selection.corner_vertices,
+                selection.face_offsets,
+                np.ascontiguousarray(uv, np.float32),
+                corner_triangles=selection.corner_triangles,
+                texture_size=size,
+                margin=float(margin),
+            )
+        )
+    )
+
+
+def certify(measured, *, margin, stretch_limit=None, warnings=()):
+    """Judges a measurement against what was promised."""
+    certificate = Certificate(measured, warnings=list(warnings))
+    if measured.get("overlaps"):
+        certificate.violations.append(f"{measured['overlaps']} overlapping pairs of faces")
+    if measured.get("flips"):
+        certificate.violations.append(f"{measured['flips']} flipped faces")
+    if measured.get("unmapped_faces"):
+        certificate.violations.append(f"{measured['unmapped_faces']} faces without UVs")
+    gap = measured.get("gap_texels")
+    if gap is not None and measured.get("charts", 0) > 1 and gap < margin - MARGIN_SLACK_TEXELS:
+        certificate.violations.append(f"charts {gap:.2f} px apart, margin is {margin:g} px")
+    worst = measured.get("l2_worst_chart")
+    if stretch_limit is not None and worst is not None and worst > stretch_limit + STRETCH_SLACK:
+        certificate.violations.append(f"worst chart has stretch {worst:.3f}, limit is {stretch_limit:g}")
+    return certificate
+
+
+def summary(measured, seconds=None):
+    """One line about a measurement."""
+    charts, overlaps, flips = (int(measured.get(key) or 0) for key in ("charts", "overlaps", "flips"))
+    parts = [
+        f"{charts} chart{'' if charts == 1 else 's'}",
+        f"stretch {_number(measured.get('l2'))} (worst chart {_number(measured.get('l2_worst_chart'))})",
+        f"{overlaps} overlap{'' if overlaps == 1 else 's'}",
+        f"{flips} flip{'' if flips == 1 else 's'}",
+        f"{100 * float(measured.get('packing_efficiency') or 0):.0f}% used",
+    ]
+    if seconds is not None:
+        parts.append(f"{seconds:.1f} s")
+    return ", ".join(parts)
+
+
+def lines(certificate, *, margin, stretch_limit):
+    """The certificate for display: (status, text), status one of OK, BAD, WARN, INFO."""
+    measured = certificate.measured
+    charts = int(measured.get("charts") or 0)
+    worst, gap = measured.get("l2_worst_chart"), measured.get("gap_texels")
+    stretch_ok = worst is not None and worst <= stretch_limit + STRETCH_SLACK
+    gap_ok = charts < 2 or gap is None or gap >= margin - MARGIN_SLACK_TEXELS
+    overlaps, flips, unmapped = (int(measured.get(key) or 0) for key in ("overlaps", "flips", "unmapped_faces"))
+    result = [
+        ("INFO", f"{int(measured.get('faces') or 0):,} faces in {charts:,} charts"),
+        ("OK" if stretch_ok else "BAD", f"Stretch {_number(measured.get('l2'))}, worst chart {_number(worst)}"),
+        ("BAD" if overlaps else "OK", f"{overlaps} overlaps"),
+        ("BAD" if flips else "OK", f"{flips} flipped faces"),
+    ]
+    if charts > 1 and gap is not None:
+        result.append(("OK" if gap_ok else "BAD", f"Margin {gap:.1f} of {margin:g} px"))
+    if unmapped:
+        result.append(("BAD", f"{unmapped} faces without UVs"))
+    result.append(("INFO", f"{100 * float(measured.get('packing_efficiency') or 0):.1f}% of the texture used"))
+    if measured.get("seam_length_absolute") is not None:
+        result.append(("INFO", f"Seams {float(measured['seam_length_absolute']):.4g} long"))
+    return result + [("WARN", text) for text in certificate.warnings]
+
+
+def _number(value):
+    return "?" if value is None else f"{float(value):.3f}"

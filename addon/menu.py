@@ -1,0 +1,27 @@
+"""Entries in Blender's own menus."""
+
+import bpy
+
+
+def menu_names():
+    """Menus that get an entry. From 4.3 on the 3D view's UV menu shows the UV editor's Unwrap menu: once is enough."""
+    names = ["IMAGE_MT_uvs_unwrap", "VIEW3D_MT_object"]
+    if bpy.app.version < (4, 3, 0):
+        names.append("VIEW3D_MT_uv_map")
+    return names
+
+
+def draw_entry(self, _context):
+    self.layout.separator()
+    self.layout.operator_context = "INVOKE_DEFAULT"
+    self.layout.operator("uv.ble_unwrap", icon="UV")
+
+
+def register():
+    for name in menu_names():
+        getattr(bpy.types, name).append(draw_entry)
+
+
+def unregister():
+    for name in menu_names():
+        getattr(bpy.types, name).remove(draw_entry)

@@ -1,0 +1,176 @@
+"""The operator `uv.ble_unwrap`: gather, compute with progress and Esc, write back, report."""
+
+import json
+
+import bpy
+
+from .. import engine, mesh_bridge, preferences, properties
+from ..task import UnwrapTask
+
+# The add-on's failures that are the user's business; anything else is a bug and may show its traceback.
+USER_ERRORS = (mesh_bridge.MeshError, engine.EngineMissing, engine.EngineError)
+
+POLL_SECONDS = 0.1
+CANCEL_POLLS = 100  # after Esc, wait at most this many polls for the worker before letting it go
+
+# While a job runs the view may be moved and zoomed; everything else waits, so that the mesh stays as it was read.
+PASSED_EVENTS = {
+    "MIDDLEMOUSE",
+    "MOUSEMOVE",
+    "INBETWEEN_MOUSEMOVE",
+    "WHEELUPMOUSE",
+    "WHEELDOWNMOUSE",
+    "TRACKPADPAN",
+    "TRACKPADZOOM",
+    "MOUSEROTATE",
+    "WINDOW_DEACTIVATE",
+}
+
+
+class UV_OT_ble_unwrap(bpy.types.Operator):
+    bl_idname = "uv.ble_unwrap"
+    bl_label = "BLE Unwrap"
+    bl_description = (
+        "Cut, flatten and pack the mesh so that no chart is stretched beyond a limit, without overlaps or flips"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = properties.operator_annotations()
+
+    @classmethod
+    def poll(cls, context):
+        if context.mode not in {"EDIT_MESH", "OBJECT"}:
+            cls.poll_message_set("Works in Object Mode and in Edit Mode of a mesh")
+            return False
+        if context.mode == "OBJECT" and not any(obj.type == "MESH" for obj in context.selected_objects):
+            cls.poll_message_set("Select a mesh object")
+            return False
+        return True
+
+    def invoke(self, context, _event):
+        properties.copy_unset(self.properties, context.scene.ble_unwrap)
+        if bpy.app.background:
+            return self.execute(context)
+        try:
+            task = self._task(context)
+            if task.selection.face_count < preferences.preference(context, "modal_threshold"):
+                return self._finish(context, task, task.run())
+            self._start(context, task)
+        except USER_ERRORS as error:
+            return self._fail(error)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        try:
+            task = self._task(context)
+            return self._finish(context, task, task.run())
+        except USER_ERRORS as error:
+            return self._fail(error)
+
+    def modal(self, context, event):
+        if event.type == "ESC" and event.value == "PRESS":
+            self._cancel_requested = True
+            self._job.cancel()
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"} if event.type in PASSED_EVENTS else {"RUNNING_MODAL"}
+        if self._cancel_requested:
+            self._cancel_polls += 1
+            if self._job.is_finished() or self._cancel_polls > CANCEL_POLLS:
+                self._stop(context)
+                self.report({"WARNING"}, "BLE Unwrap: cancelled, nothing was changed")
+                return {"CANCELLED"}
+            return {"RUNNING_MODAL"}
+        if not self._job.is_finished():
+            self._show_progress(context)
+            return {"RUNNING_MODAL"}
+        job = self._job
+        self._stop(context)
+        try:
+            return self._finish(context, self._running, job.result())
+        except engine.EngineCancelled:
+            self.report({"WARNING"}, "BLE Unwrap: cancelled, nothing was changed")
+            return {"CANCELLED"}
+        except USER_ERRORS as error:
+            return self._fail(error)
+
+    def cancel(self, context):
+        """Blender itself ends the operator: a file is loaded or the window closes."""
+        self._job.cancel()
+        self._stop(context)
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column()
+        for name in ("preset", *properties.MAIN_SETTINGS):
+            column.prop(self, name)
+        for title, names in properties.ADVANCED_SETTINGS:
+            header, body = layout.panel(f"BLE_UNWRAP_{title}", default_closed=True)
+            header.label(text=title)
+            if body:
+                for name in names:
+                    body.prop(self, name)
+
+    def _task(self, context):
+        return UnwrapTask(
+            mesh_bridge.target_objects(context),
+            properties.values(self.properties),
+            threads=preferences.preference(context, "threads"),
+        )
+
+    def _start(self, context, task):
+        self._running = task
+        self._job = task.start()
+        self._cancel_requested = False
+        self._cancel_polls = 0
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(POLL_SECONDS, window=context.window)
+        manager.modal_handler_add(self)
+        manager.progress_begin(0, 100)
+        self._show_progress(context)
+
+    def _show_progress(self, context):
+        percent = int(100 * self._job.progress())
+        context.window_manager.progress_update(percent)
+        context.workspace.status_text_set(f"BLE Unwrap: {percent}%  {self._job.stage()}    [Esc] cancel")
+
+    def _stop(self, context):
+        context.window_manager.event_timer_remove(self._timer)
+        context.window_manager.progress_end()
+        context.workspace.status_text_set(None)
+
+    def _finish(self, context, task, result):
+        outcome = task.write(result, measure_again=preferences.preference(context, "measure_again"))
+        shown = context.window_manager.ble_unwrap_certificate
+        shown.title = outcome.title
+        shown.lines = json.dumps(outcome.lines)
+        for text in outcome.certificate.warnings:
+            self.report({"WARNING"}, text)
+        if outcome.certificate.holds:
+            self.report({"INFO"}, f"BLE Unwrap: {outcome.summary}")
+        else:
+            broken = "; ".join(outcome.certificate.violations)
+            self.report({"WARNING"}, f"BLE Unwrap: {outcome.summary}. Not kept: {broken}")
+        redraw(context)
+        return {"FINISHED"}
+
+    def _fail(self, error):
+        self.report({"ERROR"}, f"BLE Unwrap: {error}")
+        return {"CANCELLED"}
+
+
+def redraw(context):
+    """Shows new UVs and the certificate in every editor."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in {"IMAGE_EDITOR", "VIEW_3D"}:
+                area.tag_redraw()
+
+
+def register():
+    bpy.utils.register_class(UV_OT_ble_unwrap)
+
+
+def unregister():
+    bpy.utils.unregister_class(UV_OT_ble_unwrap)

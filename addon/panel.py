@@ -1,0 +1,136 @@
+"""Sidebar panels of the UV editor and the 3D view: the button, the settings, the last certificate."""
+
+import json
+
+import bpy
+
+from . import properties
+
+CATEGORY = "BLE Unwrap"
+STATUS_ICONS = {"OK": "CHECKMARK", "BAD": "ERROR", "WARN": "INFO", "INFO": "BLANK1"}
+WARNING_CHARACTERS = 34  # of a line of the panel at its usual width
+
+
+def draw_settings(layout, context, names):
+    settings = context.scene.ble_unwrap
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    column = layout.column()
+    for name in names:
+        if name == "uv_map_name" and settings.uv_map != "NEW":
+            continue
+        if name == "use_selection" and context.mode != "EDIT_MESH":
+            continue
+        column.prop(settings, name)
+
+
+class _Main:
+    bl_label = "BLE Unwrap"
+    bl_category = CATEGORY
+    bl_region_type = "UI"
+
+    def draw(self, context):
+        layout = self.layout
+        row = layout.row()
+        row.scale_y = 1.4
+        row.operator_context = "INVOKE_DEFAULT"
+        row.operator("uv.ble_unwrap", icon="UV")
+        draw_settings(layout, context, ("preset", *properties.MAIN_SETTINGS))
+
+
+class _Certificate:
+    bl_label = "Last Result"
+    bl_category = CATEGORY
+    bl_region_type = "UI"
+
+    @classmethod
+    def poll(cls, context):
+        return bool(context.window_manager.ble_unwrap_certificate.lines)
+
+    def draw(self, context):
+        certificate = context.window_manager.ble_unwrap_certificate
+        column = self.layout.column(align=True)
+        column.label(text=certificate.title, icon="MESH_DATA")
+        for status, text in json.loads(certificate.lines):
+            icon = STATUS_ICONS.get(status, "BLANK1")
+            for line in wrapped(text) if status == "WARN" else [text]:
+                column.label(text=line, icon=icon)
+                icon = "BLANK1"
+
+
+class _Advanced:
+    bl_label = "Advanced"
+    bl_category = CATEGORY
+    bl_region_type = "UI"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        for title, names in properties.ADVANCED_SETTINGS:
+            header, body = self.layout.panel(f"BLE_UNWRAP_{title}", default_closed=title != "Result")
+            header.label(text=title)
+            if body:
+                draw_settings(body, context, names)
+
+
+def wrapped(text):
+    """A text in lines that fit the panel."""
+    lines, line = [], ""
+    for word in text.split():
+        if line and len(line) + 1 + len(word) > WARNING_CHARACTERS:
+            lines.append(line)
+            line = word
+        else:
+            line = f"{line} {word}".strip()
+    return [*lines, line]
+
+
+class IMAGE_PT_ble_unwrap(_Main, bpy.types.Panel):
+    bl_space_type = "IMAGE_EDITOR"
+
+    @classmethod
+    def poll(cls, context):
+        return context.space_data.mode == "UV"
+
+
+class IMAGE_PT_ble_unwrap_certificate(_Certificate, bpy.types.Panel):
+    bl_space_type = "IMAGE_EDITOR"
+    bl_parent_id = "IMAGE_PT_ble_unwrap"
+
+
+class IMAGE_PT_ble_unwrap_advanced(_Advanced, bpy.types.Panel):
+    bl_space_type = "IMAGE_EDITOR"
+    bl_parent_id = "IMAGE_PT_ble_unwrap"
+
+
+class VIEW3D_PT_ble_unwrap(_Main, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+
+
+class VIEW3D_PT_ble_unwrap_certificate(_Certificate, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "VIEW3D_PT_ble_unwrap"
+
+
+class VIEW3D_PT_ble_unwrap_advanced(_Advanced, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "VIEW3D_PT_ble_unwrap"
+
+
+CLASSES = (
+    IMAGE_PT_ble_unwrap,
+    IMAGE_PT_ble_unwrap_certificate,
+    IMAGE_PT_ble_unwrap_advanced,
+    VIEW3D_PT_ble_unwrap,
+    VIEW3D_PT_ble_unwrap_certificate,
+    VIEW3D_PT_ble_unwrap_advanced,
+)
+
+
+def register():
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,382 @@
+"""Every setting of the add-on, declared once.
+
+`BLEUnwrapSettings` holds them in the scene, where the panel shows them. The operator, the command line and the
+reports derive theirs from its annotations, so a setting added here appears everywhere. Names equal those of the
+native module where it has the setting; the others are handled on Blender's side (`BRIDGE_SETTINGS`).
+"""
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, IntVectorProperty, StringProperty
+
+# What the paper's method differs in from the defaults below; shown in the panel when the preset is chosen.
+# The native module knows the same presets by name: a test keeps the two in step.
+PAPER_VALUES = {
+    "model": "PAPER",
+    "kernel_width": 0.0,
+    "relaxation": 1.7,
+    "initial": "RANDOM",
+    "geodesics": "FAST_MARCHING",
+    "landmark_min": 3,
+    "landmark_max": 0,
+    "holes": "CUT",
+    "stretch_solver": "LINE_SEARCH",
+    "stretch_iterations": 60,
+    "margin": 2.0,
+    "texture_size": (1024, 1024),
+    "rotation": "QUARTER",
+}
+
+
+def _apply_preset(settings, _context):
+    """Shows the preset's own values: what the panel displays is what will run."""
+    for name in annotations():
+        if name not in BRIDGE_SETTINGS and name != "preset":
+            settings.property_unset(name)
+    if settings.preset == "PAPER":
+        for name, value in PAPER_VALUES.items():
+            setattr(settings, name, value)
+
+
+class BLEUnwrapSettings(bpy.types.PropertyGroup):
+    """Settings of BLE Unwrap, kept with the scene."""
+
+    preset: EnumProperty(
+        name="Preset",
+        description="Starting values of all settings below",
+        items=(
+            ("DEFAULT", "Default", "Extended model, fast solvers: least stretch and fewest charts"),
+            ("PAPER", "Paper", "The published method as printed: slower, more charts"),
+        ),
+        default="DEFAULT",
+        update=_apply_preset,
+    )
+
+    # ---- what an artist needs
+    stretch_limit: FloatProperty(
+        name="Stretch Limit",
+        description=(
+            "Largest L2 stretch that any chart may have; 1 is none. Lower values give less distortion and more seams"
+        ),
+        default=1.1,
+        min=1.001,
+        max=100.0,
+        soft_min=1.01,
+        soft_max=1.5,
+        step=1,
+        precision=3,
+    )
+    texture_size: IntVectorProperty(
+        name="Texture Size",
+        description="Width and height in pixels of the texture that the margin is meant for; need not be square",
+        default=(2048, 2048),
+        size=2,
+        min=16,
+        max=16384,
+        soft_min=256,
+        soft_max=8192,
+    )
+    margin: FloatProperty(
+        name="Margin",
+        description="Least distance between two charts, in pixels of the texture; half of it is kept to the border",
+        default=4.0,
+        min=0.0,
+        max=256.0,
+        soft_max=32.0,
+        step=50,
+        precision=1,
+    )
+    rotation: EnumProperty(
+        name="Rotation",
+        description="How charts may be turned to pack them tighter",
+        items=(
+            ("ANY", "Any", "Any angle: tightest"),
+            ("QUARTER", "Quarter Turns", "Upright, then by multiples of 90°"),
+            ("NONE", "None", "As they were flattened"),
+        ),
+        default="ANY",
+    )
+    use_seams: BoolProperty(
+        name="Keep Seams",
+        description="Cut along the seams that the mesh already has, and add only those that the stretch limit needs",
+        default=False,
+    )
+    use_selection: BoolProperty(
+        name="Only Selected Faces",
+        description="In Edit Mode, unwrap the selected faces and leave the others as they are",
+        default=True,
+    )
+
+    # ---- where the result goes
+    uv_map: EnumProperty(
+        name="UV Map",
+        description="Which UV map is written",
+        items=(
+            ("ACTIVE", "Active", "Replace the active UV map; one is made where there is none"),
+            ("NEW", "New", "Add a UV map and make it the active one"),
+        ),
+        default="ACTIVE",
+    )
+    uv_map_name: StringProperty(
+        name="Name",
+        description="Name of UV maps that are made",
+        default="UVMap",
+        maxlen=60,
+    )
+    use_original_bounds: BoolProperty(
+        name="Keep Place",
+        description="Pack into the rectangle that the faces' UVs fill now, not into the whole square",
+        default=False,
+    )
+    mark_seams: BoolProperty(
+        name="Mark Seams",
+        description="Mark the borders of the charts as seams of the mesh, beside those it has",
+        default=False,
+    )
+
+    # ---- charts
+    weld: BoolProperty(
+        name="Join Coincident Vertices",
+        description="Let charts run across vertices at the same place, as imported files often have; the mesh is kept",
+        default=True,
+    )
+    merge: BoolProperty(
+        name="Merge Charts",
+        description="Join neighbouring charts again where their union stays within the stretch limit",
+        default=True,
+    )
+    holes: EnumProperty(
+        name="Holes",
+        description="What happens to charts with holes",
+        items=(
+            ("KEEP", "Keep", "A chart may have holes; other charts may be packed into them"),
+            ("CUT", "Cut", "Every chart is cut open to a disk"),
+        ),
+        default="KEEP",
+    )
+    chart_scale: EnumProperty(
+        name="Chart Scale",
+        description="How large charts are relative to each other",
+        items=(
+            ("UNIFORM", "Uniform", "The same texel density everywhere"),
+            ("STRETCH", "By Stretch", "More pixels where a chart is stretched, between half and double"),
+        ),
+        default="UNIFORM",
+    )
+    seed: IntProperty(
+        name="Seed",
+        description="Start of all random choices; the same seed gives the same result on any machine",
+        default=0,
+        min=0,
+    )
+
+    # ---- landmarks and distances
+    geodesics: EnumProperty(
+        name="Geodesics",
+        description="How distances along the surface are measured",
+        items=(
+            ("FAST_MARCHING", "Fast Marching", "Wave fronts across triangles: accurate"),
+            ("DIJKSTRA", "Dijkstra", "Shortest paths along edges and unfolded diagonals: 2% less accurate, faster"),
+        ),
+        default="FAST_MARCHING",
+    )
+    landmark_fraction: FloatProperty(
+        name="Landmarks",
+        description="Share of a chart's vertices that serve as landmarks of the embedding",
+        default=0.01,
+        min=0.0001,
+        max=1.0,
+        soft_max=0.1,
+        step=1,
+        precision=4,
+    )
+    landmark_min: IntProperty(
+        name="At Least",
+        description="Fewest landmarks of a chart",
+        default=48,
+        min=3,
+        max=100_000,
+        soft_max=1000,
+    )
+    landmark_max: IntProperty(
+        name="At Most",
+        description="Most landmarks of a chart; 0 sets no bound",
+        default=160,
+        min=0,
+        max=100_000,
+        soft_max=2000,
+    )
+
+    # ---- embedding
+    model: EnumProperty(
+        name="Model",
+        description="How a chart is laid out in the plane before its stretch is minimised",
+        items=(
+            ("DEFAULT", "Extended", "Bernoulli logistic embedding with intercepts and logistic affinity"),
+            ("PAPER", "As Printed", "Bernoulli logistic embedding as in the paper: Gaussian affinity, no intercepts"),
+            ("ISOMAP", "Isomap", "Classical scaling of geodesic distances, for comparison"),
+        ),
+        default="DEFAULT",
+    )
+    kernel_width: FloatProperty(
+        name="Kernel Width",
+        description=(
+            "Width of the affinity as a multiple of the mean squared distance; useful from 0.1 to 0.3. "
+            "0 takes the model's own"
+        ),
+        default=0.2,
+        min=0.0,
+        max=10.0,
+        soft_max=1.0,
+        step=1,
+        precision=3,
+    )
+    relaxation: FloatProperty(
+        name="Relaxation",
+        description="Over-relaxation of the sweeps; the likelihood never falls between 0 and 2",
+        default=1.6,
+        min=0.01,
+        max=1.99,
+        step=10,
+        precision=2,
+    )
+    max_sweeps: IntProperty(
+        name="Sweeps",
+        description="Most sweeps over all points",
+        default=60,
+        min=1,
+        max=10000,
+        soft_max=500,
+    )
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="Relative change of the likelihood at which the sweeps stop",
+        default=1e-5,
+        min=0.0,
+        max=0.1,
+        step=1,
+        precision=7,
+    )
+    update: EnumProperty(
+        name="Update",
+        description="Order in which points move",
+        items=(
+            ("SERIAL", "Serial", "One after another: the likelihood rises at every step"),
+            ("PARALLEL", "Parallel", "All at once from the same state: needs a relaxation below 1"),
+        ),
+        default="SERIAL",
+    )
+    initial: EnumProperty(
+        name="Start",
+        description="Where the embedding starts from",
+        items=(
+            ("MDS", "Classical Scaling", "Multidimensional scaling of the landmarks: fewest sweeps"),
+            ("RANDOM", "Random", "Normally distributed points, drawn from the seed"),
+        ),
+        default="MDS",
+    )
+
+    # ---- stretch
+    stretch_solver: EnumProperty(
+        name="Stretch Solver",
+        description="How the stretch of a chart is minimised",
+        items=(
+            ("NEWTON", "Newton", "Projected Newton steps: fast"),
+            ("LINE_SEARCH", "Line Search", "One vertex at a time along random directions, as in the paper"),
+        ),
+        default="NEWTON",
+    )
+    stretch_iterations: IntProperty(
+        name="Iterations",
+        description="Most iterations of the stretch solver",
+        default=40,
+        min=1,
+        max=10000,
+        soft_max=500,
+    )
+
+
+# Settings that the native module never sees.
+BRIDGE_SETTINGS = ("use_seams", "use_selection", "uv_map", "uv_map_name", "use_original_bounds", "mark_seams")
+
+# What the panel shows at once, and what it folds away, by title.
+MAIN_SETTINGS = ("stretch_limit", "texture_size", "margin", "rotation", "use_seams", "use_selection")
+ADVANCED_SETTINGS = (
+    ("Result", ("uv_map", "uv_map_name", "use_original_bounds", "mark_seams")),
+    ("Charts", ("weld", "merge", "holes", "chart_scale", "seed")),
+    ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max")),
+    ("Embedding", ("model", "kernel_width", "relaxation", "max_sweeps", "tolerance", "update", "initial")),
+    ("Stretch", ("stretch_solver", "stretch_iterations")),
+)
+
+
+def annotations():
+    """The declared settings: name -> deferred property, in order of declaration."""
+    return BLEUnwrapSettings.__annotations__
+
+
+def operator_annotations():
+    """The same settings for an operator.
+
+    They are not remembered from its last run, since the scene keeps them: what a call leaves out comes from the scene
+    (interactively) or from the defaults (in a script).
+    """
+    result = {}
+    for name, deferred in annotations().items():
+        keywords = {key: value for key, value in deferred.keywords.items() if key != "update"}
+        keywords["options"] = {"SKIP_SAVE"}
+        result[name] = deferred.function(**keywords)
+    return result
+
+
+def copy_unset(target, source):
+    """Gives `target` the values of `source` for every setting that `target` does not have set itself."""
+    explicit = {name for name in annotations() if target.is_property_set(name)}
+    # A preset named in the call brings its own values: the scene's must not override them.
+    names = [name for name in annotations() if "preset" not in explicit or name in BRIDGE_SETTINGS]
+    for name in names:
+        if name not in explicit and source.is_property_set(name):
+            setattr(target, name, getattr(source, name))
+
+
+def values(settings):
+    """Settings as plain values; those of the native module only where they were set, so that its presets hold."""
+    result = {}
+    for name in annotations():
+        if name in BRIDGE_SETTINGS or name == "preset" or settings.is_property_set(name):
+            value = getattr(settings, name)
+            if isinstance(value, float):
+                value = float(f"{value:.7g}")  # Blender keeps 32 bits: 1.1 is meant, not 1.10000002384
+            result[name] = tuple(value) if name == "texture_size" else value
+    return result
+
+
+def default_values(preset="DEFAULT"):
+    """The declared default of every setting under a preset, as plain values."""
+    result = {name: deferred.keywords.get("default") for name, deferred in annotations().items()}
+    if preset == "PAPER":
+        result.update(PAPER_VALUES, preset="PAPER")
+    return result
+
+
+class BLEUnwrapCertificate(bpy.types.PropertyGroup):
+    """What the last run measured from the UVs that Blender holds; of this session only."""
+
+    title: StringProperty(name="Objects", options={"SKIP_SAVE"})
+    lines: StringProperty(name="Lines", description="JSON list of [status, text]", options={"SKIP_SAVE"})
+
+
+CLASSES = (BLEUnwrapSettings, BLEUnwrapCertificate)
+
+
+def register():
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Scene.ble_unwrap = bpy.props.PointerProperty(type=BLEUnwrapSettings)
+    bpy.types.WindowManager.ble_unwrap_certificate = bpy.props.PointerProperty(type=BLEUnwrapCertificate)
+
+
+def unregister():
+    del bpy.types.WindowManager.ble_unwrap_certificate
+    del bpy.types.Scene.ble_unwrap
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

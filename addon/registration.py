@@ -1,0 +1,24 @@
+"""Registers the add-on's modules in order, and takes them back in reverse."""
+
+from . import command, menu, panel, preferences, properties
+from .operators import unwrap
+
+MODULES = (preferences, properties, unwrap, panel, menu, command)
+
+
+def register():
+    """Registers everything; when one module fails, those before it are taken back and the error goes on."""
+    done = []
+    try:
+        for module in MODULES:
+            module.register()
+            done.append(module)
+    except Exception:
+        for module in reversed(done):
+            module.unregister()
+        raise
+
+
+def unregister():
+    for module in reversed(MODULES):
+        module.unregister()

@@ -1,0 +1,89 @@
+"""BLE Unwrap against Smart UV Project on your own meshes, at the same margin.
+
+blender -b -P blender_scripts/compare.py -- IN... -o OUTDIR [--margin 4] [--texture-size 2048] [settings]
+python blender_scripts/compare.py IN... -o OUTDIR [settings]
+
+Writes OUTDIR/compare.json, a picture of both layouts a model, coloured by stretch, and a .blend with both UV maps
+(`--no-blend` leaves it out). Exit codes as for unwrap.py.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import addon_loader
+import pictures
+import tables
+
+
+def compare_objects(objects, name, out, settings, *, threads=0, picture_size=900, progress=None):
+    """Compares on objects of the current scene and draws the picture; the rows of the table."""
+    comparison, bridge = addon_loader.load("comparison"), addon_loader.load("mesh_bridge")
+    rows = comparison.compare(objects, settings, threads=threads, progress=progress)
+    panels = []
+    for key, map_name in (("ble_unwrap", comparison.BLE_MAP), ("smart_uv_best", comparison.SMART_MAP)):
+        comparison.activate_map(bridge.unique_meshes(objects), map_name)
+        selection = bridge.gather(bridge.unique_meshes(objects))
+        picture = pictures.layout(selection, bridge.read_uvs(selection), picture_size)
+        panels.append(pictures.with_captions(picture, tables.caption(key, rows[key])))
+    comparison.activate_map(bridge.unique_meshes(objects), comparison.BLE_MAP)
+    picture = pictures.side_by_side(panels)
+    out.mkdir(parents=True, exist_ok=True)
+    pictures.write_png(out / f"{name}_layout.png", pictures.stacked([picture, pictures.legend(picture.shape[1])]))
+    return rows
+
+
+def main(argv):
+    batch, asset_io = addon_loader.load("batch"), addon_loader.load("asset_io")
+    engine, bridge = addon_loader.load("engine"), addon_loader.load("mesh_bridge")
+    parser = argparse.ArgumentParser(prog="compare.py", description="BLE Unwrap against Smart UV Project.")
+    parser.add_argument("inputs", nargs="+", metavar="IN")
+    parser.add_argument("-o", "--output", required=True, metavar="OUTDIR")
+    parser.add_argument("--picture-size", type=int, default=900, help="pixels of one layout (default: 900)")
+    parser.add_argument("--blend", action=argparse.BooleanOptionalAction, default=True, help="also write a .blend")
+    parser.add_argument("--threads", type=int, default=0)
+    batch.add_setting_arguments(parser)
+    options = parser.parse_args(argv)
+    settings = batch.settings_of(options, parser)
+    if not 64 <= options.picture_size <= 8192:
+        parser.error("--picture-size must be between 64 and 8192")
+    out = Path(options.output)
+    try:
+        engine.native()
+        out.mkdir(parents=True, exist_ok=True)
+    except engine.EngineMissing as error:
+        print(f"compare.py: {error}", file=sys.stderr)
+        return batch.ENVIRONMENT
+    except OSError as error:
+        print(f"compare.py: cannot write to {out}: {error.strerror}", file=sys.stderr)
+        return batch.SOME_FAILED
+    models, failed = {}, {}
+    for number, name in enumerate(options.inputs, 1):
+        print(f"[{number}/{len(options.inputs)}] {name}", flush=True)
+        source = Path(name)
+        key = source.stem if source.stem not in models else f"{source.stem}_{number}"
+        try:
+            objects = [obj for obj in asset_io.load(source) if obj.data.polygons]
+            if not objects:
+                raise bridge.MeshError("holds no faces")
+            models[key] = compare_objects(
+                objects, key, out, settings, threads=options.threads, picture_size=options.picture_size
+            )
+            if options.blend:
+                asset_io.save(out / f"{key}.blend")
+        except (*batch.USER_ERRORS, OSError) as error:
+            failed[name] = str(error)
+            print(f"{name}: {error}", file=sys.stderr, flush=True)
+    if models:
+        print("", *tables.table(models), "", sep="\n")
+    batch.write_json(out / "compare.json", {"params": settings, "models": models, "failed": failed})
+    print(f"written to {out}/")
+    if failed:
+        return batch.SOME_FAILED
+    return batch.VIOLATED if any(rows["ble_unwrap"]["violations"] for rows in models.values()) else batch.OK
+
+
+if __name__ == "__main__":
+    addon_loader.run(main)

@@ -1,0 +1,48 @@
+"""The demonstration: what `make demo` runs once the extension's zip is built.
+
+python blender_scripts/demo.py [MESH] [-o out] [--zip FILE] [--no-render]
+
+Finds a Blender ($BLENDER, else `blender` 4.2 or later on PATH, else PyPI's bpy, which is downloaded once), installs the
+extension into a throw-away profile as a user would, and runs demo_inside.py there.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import launch
+
+ENVIRONMENT = 3
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="demo.py", description="Unwrap demonstration meshes, or one of your own.")
+    parser.add_argument("mesh", nargs="?", help="your own file instead: .blend .obj .glb .gltf .ply .stl .fbx")
+    parser.add_argument("-o", "--output", default=launch.REPO / "out", help="directory of the results (default: out)")
+    parser.add_argument("--zip", help="the extension (default: the one that `make zip` built)")
+    parser.add_argument("--render", action=argparse.BooleanOptionalAction, default=True, help="also render pictures")
+    options = parser.parse_args()
+    if options.mesh and not Path(options.mesh).is_file():
+        parser.error(f"{options.mesh}: no such file")
+    try:
+        archive = launch.find_archive(options.zip)
+        launch.say("Looking for a Blender")
+        blender = launch.find_blender()
+        with launch.Profile(blender) as profile:
+            launch.say(f"Installing {archive.name} into a throw-away profile of {blender.name}")
+            profile.install(archive)
+            arguments = ["-o", Path(options.output).resolve()]
+            if options.mesh:
+                arguments += ["--mesh", Path(options.mesh).resolve()]
+            if not options.render:
+                arguments.append("--no-render")
+            return profile.run(launch.SCRIPTS / "demo_inside.py", *arguments).returncode
+    except launch.Unavailable as error:
+        print(f"demo: {error}", file=sys.stderr)
+        return ENVIRONMENT
+
+
+if __name__ == "__main__":
+    sys.exit(main())

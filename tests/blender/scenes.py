@@ -1,0 +1,110 @@
+"""Meshes for the tests, and what is read off their UVs."""
+
+import bpy
+import demo_meshes
+import numpy as np
+
+add_mesh = demo_meshes.add_mesh
+
+
+def grid(cells=6, name="Grid", bump=0.0):
+    """A sheet of cells² quads on the unit square, raised in the middle."""
+    t = np.linspace(0.0, 1.0, cells + 1)
+    x, y = (a.reshape(-1) for a in np.meshgrid(t, t, indexing="ij"))
+    z = bump * np.sin(np.pi * x) * np.sin(np.pi * y)
+    corner = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
+    quads = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1).reshape(-1, 4)
+    return add_mesh(name, np.stack([x, y, z], axis=1), quads)
+
+
+def cube(name="Cube", size=2.0):
+    h = size / 2
+    positions = [(x, y, z) for x in (-h, h) for y in (-h, h) for z in (-h, h)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return add_mesh(name, positions, faces)
+
+
+def sphere(name="Sphere", cells=8):
+    return add_mesh(name, *demo_meshes.cube_sphere(cells))
+
+
+def n_gons(name="N-gons"):
+    """A pentagon, a concave hexagon and a triangle around it in one plane."""
+    positions = [(0, 0, 0), (2, 0, 0), (3, 2, 0), (1, 3, 0), (-1, 2, 0), (1, -2, 0), (1, -1, 0), (3, -2, 0), (4, 0, 0)]
+    return add_mesh(name, positions, [(0, 1, 2, 3, 4), (0, 5, 6, 7, 8, 1), (1, 8, 2)])
+
+
+def select(*objects):
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj in objects)
+    bpy.context.view_layer.objects.active = objects[0]
+
+
+def edit(*objects, faces=None):
+    """Edit mode of the objects with all faces selected, or with these of the first one only."""
+    select(*objects)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    if faces is not None:
+        bpy.ops.object.mode_set(mode="OBJECT")
+        mesh = objects[0].data
+        mesh.vertices.foreach_set("select", np.zeros(len(mesh.vertices), bool))
+        mesh.edges.foreach_set("select", np.zeros(len(mesh.edges), bool))
+        mesh.polygons.foreach_set("select", np.isin(np.arange(len(mesh.polygons)), faces))
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.context.tool_settings.mesh_select_mode = (False, False, True)
+
+
+def uvs(obj, name=None):
+    """UVs by corner, (c, 2) float32; of a mesh in object mode."""
+    assert obj.mode == "OBJECT", "UV maps are empty in edit mode"
+    layer = obj.data.uv_layers[name] if name else obj.data.uv_layers.active
+    assert layer is not None, f"{obj.name} has no UV map"
+    values = np.empty(2 * len(obj.data.loops), np.float32)
+    layer.uv.foreach_get("vector", values)
+    return values.reshape(-1, 2)
+
+
+def triangle_areas(obj, uv):
+    """Signed UV areas of Blender's own triangulation: positive is not flipped."""
+    mesh = obj.data
+    mesh.calc_loop_triangles()
+    loops = np.empty(3 * len(mesh.loop_triangles), np.int32)
+    mesh.loop_triangles.foreach_get("loops", loops)
+    a, b, c = uv.astype(float)[loops.reshape(-1, 3)].transpose(1, 0, 2)
+    return 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+
+
+def surface_areas(obj):
+    mesh = obj.data
+    mesh.calc_loop_triangles()
+    values = np.empty(len(mesh.loop_triangles), np.float32)
+    mesh.loop_triangles.foreach_get("area", values)
+    return values.astype(float)
+
+
+def assert_good(obj):
+    """Finite UVs within the square, no triangle flipped or collapsed."""
+    uv = uvs(obj)
+    assert np.isfinite(uv).all()
+    assert uv.min() >= 0 and uv.max() <= 1
+    assert (triangle_areas(obj, uv) > 0).all()
+    return uv
+
+
+def fingerprint(obj):
+    """Everything about a mesh and its object that an unwrap must leave alone."""
+    mesh = obj.data
+    positions = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", positions)
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    flags = [np.empty(len(mesh.polygons), bool) for _ in range(2)]
+    mesh.polygons.foreach_get("select", flags[0])
+    mesh.polygons.foreach_get("hide", flags[1])
+    materials = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("material_index", materials)
+    seams = np.empty(len(mesh.edges), bool)
+    mesh.edges.foreach_get("use_seam", seams)
+    arrays = (positions, corners, *flags, materials, seams)
+    return (obj.mode, obj.select_get(), *(a.tobytes() for a in arrays))

@@ -1,0 +1,156 @@
+"""What the add-on adds to Blender, and that all of it goes away again."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import addon_loader
+import bpy
+import pytest
+
+
+def entries(menu, addon):
+    """Draw functions of the add-on in a menu."""
+    draw = addon("menu").draw_entry
+    functions = getattr(getattr(bpy.types, menu).draw, "_draw_funcs", [])
+    return sum(function is draw for function in functions)
+
+
+def test_menus_have_one_entry_each(addon):
+    assert entries("IMAGE_MT_uvs_unwrap", addon) == 1
+    assert entries("VIEW3D_MT_object", addon) == 1
+    # From 4.3 on this menu shows the one above: an entry of its own would be there twice.
+    assert entries("VIEW3D_MT_uv_map", addon) == int(bpy.app.version < (4, 3, 0))
+
+
+def test_all_settings_are_properties_of_scene_and_operator(addon):
+    names = set(addon("properties").annotations())
+    assert names <= set(bpy.context.scene.ble_unwrap.bl_rna.properties.keys())
+    assert names <= set(bpy.ops.uv.ble_unwrap.get_rna_type().properties.keys())
+    shown = set(addon("properties").MAIN_SETTINGS)
+    for _, group in addon("properties").ADVANCED_SETTINGS:
+        shown |= set(group)
+    assert shown == names - {"preset"}, "every setting is in the panel"
+
+
+def test_every_setting_has_a_tooltip(addon):
+    for name, deferred in addon("properties").annotations().items():
+        text = deferred.keywords["description"]
+        assert len(text) > 10 and not text.endswith("."), name
+
+
+@pytest.mark.parametrize("preset", ["DEFAULT", "PAPER"])
+def test_presets_are_those_of_the_native_module(addon, preset):
+    properties, engine = addon("properties"), addon("engine")
+    settings = bpy.context.scene.ble_unwrap
+    settings.preset = preset
+    shown = {name: getattr(settings, name) for name in properties.annotations() if name not in properties.BRIDGE_SETTINGS}
+    shown["texture_size"] = tuple(shown["texture_size"])
+    ours = engine.native_settings(shown)
+    theirs = engine.default_settings(preset)
+    theirs.pop("threads")
+    size = theirs["texture_size"]
+    theirs["texture_size"] = (size, size) if isinstance(size, int) else tuple(size)
+    assert set(ours) == set(theirs)
+    for name, value in theirs.items():
+        expected = pytest.approx(value, rel=1e-6) if isinstance(value, float) else value
+        assert ours[name] == expected, name
+
+
+def test_choosing_a_preset_keeps_where_the_result_goes():
+    settings = bpy.context.scene.ble_unwrap
+    settings.uv_map = "NEW"
+    settings.margin = 9
+    settings.preset = "PAPER"
+    assert (settings.uv_map, settings.margin, settings.stretch_solver) == ("NEW", 2, "LINE_SEARCH")
+    settings.preset = "DEFAULT"
+    assert (settings.uv_map, settings.margin, settings.stretch_solver) == ("NEW", 4, "NEWTON")
+
+
+def test_scene_settings_fill_what_a_call_leaves_out(addon):
+    properties = addon("properties")
+
+    class Target:
+        """Stands for an operator's properties."""
+
+        def __init__(self, **given):
+            self.__dict__.update(given)
+
+        def is_property_set(self, name):
+            return name in self.__dict__
+
+    scene = bpy.context.scene.ble_unwrap
+    scene.margin = 7
+    scene.seed = 3
+    target = Target(seed=5)
+    properties.copy_unset(target, scene)
+    assert (target.margin, target.seed) == (7, 5)
+    target = Target(preset="PAPER")
+    properties.copy_unset(target, scene)
+    assert not target.is_property_set("margin")
+
+
+def test_unregister_leaves_nothing_and_register_works_again(addon):
+    registration = addon("registration")
+    classes = {name for name in dir(bpy.types) if "ble_unwrap" in name.lower()}
+    assert classes
+    registration.unregister()
+    try:
+        assert not {name for name in dir(bpy.types) if "ble_unwrap" in name.lower()}
+        assert not hasattr(bpy.types.Scene, "ble_unwrap")
+        assert not hasattr(bpy.types.WindowManager, "ble_unwrap_certificate")
+        assert not hasattr(bpy.types, "UV_OT_ble_unwrap")
+        for menu in ("IMAGE_MT_uvs_unwrap", "VIEW3D_MT_object", "VIEW3D_MT_uv_map"):
+            assert entries(menu, addon) == 0
+    finally:
+        registration.register()
+    assert {name for name in dir(bpy.types) if "ble_unwrap" in name.lower()} == classes
+    assert entries("IMAGE_MT_uvs_unwrap", addon) == 1
+
+
+def test_failed_registration_takes_back_what_was_registered(addon, monkeypatch):
+    registration, panel = addon("registration"), addon("panel")
+    registration.unregister()
+
+    def fail():
+        raise RuntimeError("on purpose")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(panel, "register", fail)
+        with pytest.raises(RuntimeError, match="on purpose"):
+            registration.register()
+        assert not hasattr(bpy.types.Scene, "ble_unwrap")
+    registration.register()
+
+
+def test_missing_library_is_a_clear_error(addon, monkeypatch):
+    from scenes import cube
+
+    obj = cube()
+    monkeypatch.setitem(sys.modules, "ble_unwrap_native", None)
+    with pytest.raises(RuntimeError, match="native library of BLE Unwrap cannot be loaded"):
+        bpy.ops.uv.ble_unwrap()
+    assert len(obj.data.uv_layers) == 0
+
+
+def test_preferences_are_found(addon):
+    preference = addon("preferences").preference
+    assert preference(bpy.context, "threads") == 2
+    assert preference(bpy.context, "modal_threshold") > 0
+
+
+def test_archive_is_a_valid_extension():
+    import os
+
+    import addon_utils
+
+    tool = next((Path(path) / "bl_pkg/cli/blender_ext.py" for path in addon_utils.paths() if "core" in path), None)
+    if tool is None or not tool.is_file():
+        pytest.skip("this Blender does not bring blender_ext.py along")
+    python = sys.executable
+    if not addon_loader.is_module() and "python" not in Path(python).name:
+        pytest.skip("no Python executable beside this Blender")
+    done = subprocess.run(
+        [python, str(tool), "validate", os.environ["BLE_ARCHIVE"]], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -1,0 +1,443 @@
+"""The operator on every kind of selection."""
+
+import json
+
+import bpy
+import numpy as np
+import pytest
+from scenes import (
+    add_mesh,
+    assert_good,
+    cube,
+    edit,
+    fingerprint,
+    grid,
+    n_gons,
+    select,
+    sphere,
+    surface_areas,
+    triangle_areas,
+    uvs,
+)
+
+unwrap = bpy.ops.uv.ble_unwrap
+
+
+def overlaps(addon, *objects):
+    return addon("comparison").overlapping_faces(list(objects))
+
+
+def certificate():
+    return json.loads(bpy.context.window_manager.ble_unwrap_certificate.lines)
+
+
+def refused(match, **settings):
+    """The operator reports an error, which Python sees as an exception."""
+    with pytest.raises(RuntimeError, match=match):
+        unwrap(**settings)
+
+
+def test_object_mode(addon):
+    obj = sphere()
+    before = fingerprint(obj)
+    assert unwrap() == {"FINISHED"}
+    assert fingerprint(obj) == before
+    assert [layer.name for layer in obj.data.uv_layers] == ["UVMap"]
+    assert_good(obj)
+    assert overlaps(addon, obj) == 0
+    assert all(status in {"OK", "INFO"} for status, _ in certificate())
+
+
+def test_edit_mode_gives_the_same_uvs_and_stays_in_edit_mode():
+    obj = sphere()
+    unwrap()
+    expected = uvs(obj)
+    edit(obj)
+    assert unwrap() == {"FINISHED"}
+    assert bpy.context.mode == "EDIT_MESH"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert np.array_equal(uvs(obj), expected)
+
+
+def test_flat_sheet_is_reproduced():
+    obj = grid(8)
+    unwrap(margin=0.0)
+    ratio = triangle_areas(obj, uvs(obj)) / surface_areas(obj)
+    assert np.ptp(ratio) < 1e-3 * ratio.mean()
+
+
+def test_several_objects_share_one_atlas_and_one_density(addon):
+    first, second = cube("A"), sphere("B")
+    second.scale = (3, 3, 3)
+    second.location.x = 5
+    bpy.context.view_layer.update()
+    select(first, second)
+    assert unwrap() == {"FINISHED"}
+    for obj in (first, second):
+        assert_good(obj)
+    assert overlaps(addon, first, second) == 0
+    density = [
+        triangle_areas(obj, uvs(obj)).sum() / (surface_areas(obj).sum() * obj.scale.x ** 2) for obj in (first, second)
+    ]
+    assert density[1] == pytest.approx(density[0], rel=0.05)
+
+
+def test_several_objects_in_edit_mode(addon):
+    first, second = cube("A"), sphere("B")
+    edit(first, second)
+    assert unwrap() == {"FINISHED"}
+    assert {obj.mode for obj in (first, second)} == {"EDIT"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert_good(first)
+    assert_good(second)
+    assert overlaps(addon, first, second) == 0
+
+
+def test_edit_mode_leaves_selected_objects_outside_it_alone():
+    edited, other = cube("A"), sphere("B")
+    edit(edited)
+    other.select_set(True)
+    assert unwrap() == {"FINISHED"}
+    assert (edited.mode, other.mode) == ("EDIT", "OBJECT")
+    assert other.select_get()
+    assert len(other.data.uv_layers) == 0
+
+
+def test_linked_duplicates_are_unwrapped_once(addon):
+    first = cube("A")
+    second = first.copy()
+    bpy.context.collection.objects.link(second)
+    select(first, second)
+    assert len(addon("mesh_bridge").target_objects(bpy.context)) == 1
+    assert unwrap() == {"FINISHED"}
+    assert_good(first)
+
+
+def test_selected_faces_only():
+    obj = grid(6, bump=0.3)
+    unwrap()
+    before = uvs(obj).copy()
+    chosen = [0, 1, 6, 7, 20]
+    edit(obj, faces=chosen)
+    assert unwrap(use_selection=True) == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    after = uvs(obj)
+    inside = np.repeat(np.isin(np.arange(36), chosen), 4)
+    assert np.array_equal(after[~inside], before[~inside])
+    assert (after[inside] != before[inside]).any(axis=1).all()
+    picked = np.empty(len(obj.data.polygons), bool)
+    obj.data.polygons.foreach_get("select", picked)
+    assert np.flatnonzero(picked).tolist() == chosen
+
+
+def test_all_faces_in_edit_mode_when_asked():
+    obj = grid(6)
+    edit(obj, faces=[3])
+    unwrap(use_selection=False)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert_good(obj)
+
+
+def test_selection_keeps_its_place_in_the_texture():
+    obj = grid(6)
+    unwrap()
+    values = uvs(obj) * np.float32(0.25) + np.float32((0.5, 0.125))
+    obj.data.uv_layers.active.uv.foreach_set("vector", values.reshape(-1))
+    edit(obj)
+    assert unwrap(use_original_bounds=True, texture_size=(1024, 1024), margin=2.0) == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    uv = assert_good(obj)
+    assert (uv.min(axis=0) >= values.min(axis=0) - 1e-6).all()
+    assert (uv.max(axis=0) <= values.max(axis=0) + 1e-6).all()
+
+
+def test_nothing_selected_is_an_error():
+    obj = grid()
+    edit(obj, faces=[])
+    refused("No faces are selected")
+    assert bpy.context.mode == "EDIT_MESH"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert len(obj.data.uv_layers) == 0
+
+
+def test_hidden_faces_are_unwrapped_in_object_mode():
+    obj = grid()
+    obj.data.polygons[4].hide = True
+    unwrap()
+    assert_good(obj)
+    assert obj.data.polygons[4].hide
+
+
+def test_n_gons():
+    obj = n_gons()
+    before = fingerprint(obj)
+    unwrap()
+    assert_good(obj)
+    assert fingerprint(obj) == before
+
+
+def test_shape_keys_and_modifiers_are_left_alone():
+    obj = sphere()
+    obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="Tall")
+    for point in key.data:
+        point.co.z *= 3
+    key.value = 1.0
+    obj.modifiers.new("Subdivision", "SUBSURF")
+    before = fingerprint(obj)
+    tall = [tuple(point.co) for point in key.data]
+    assert unwrap() == {"FINISHED"}
+    assert_good(obj)
+    assert fingerprint(obj) == before
+    assert [tuple(point.co) for point in obj.data.shape_keys.key_blocks["Tall"].data] == tall
+    assert [modifier.type for modifier in obj.modifiers] == ["SUBSURF"]
+
+
+def test_edit_mode_with_shape_keys():
+    obj = sphere()
+    obj.shape_key_add(name="Basis")
+    obj.shape_key_add(name="Other")
+    obj.active_shape_key_index = 1
+    edit(obj)
+    assert unwrap() == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert_good(obj)
+
+
+def test_active_map_is_written_and_others_are_kept():
+    obj = cube()
+    maps = obj.data.uv_layers
+    maps.new(name="first")
+    maps.new(name="second")
+    maps.active = maps["second"]
+    before = uvs(obj, "first").copy()
+    unwrap()
+    assert np.array_equal(uvs(obj, "first"), before)
+    assert maps.active.name == "second"
+    assert_good(obj)
+
+
+def test_new_map_is_made_by_name():
+    obj = cube()
+    obj.data.uv_layers.new(name="old")
+    before = uvs(obj, "old").copy()
+    unwrap(uv_map="NEW", uv_map_name="baked")
+    assert obj.data.uv_layers.active.name == "baked"
+    assert np.array_equal(uvs(obj, "old"), before)
+    assert_good(obj)
+
+
+def test_eight_maps():
+    obj = cube()
+    for number in range(8):
+        obj.data.uv_layers.new(name=f"map {number}")
+    before = [uvs(obj, f"map {number}").copy() for number in range(8)]
+    refused("8 UV maps already", uv_map="NEW")
+    assert all(np.array_equal(uvs(obj, f"map {number}"), before[number]) for number in range(8))
+    active = obj.data.uv_layers.active.name
+    assert unwrap() == {"FINISHED"}
+    assert len(obj.data.uv_layers) == 8
+    assert obj.data.uv_layers.active.name == active
+    assert_good(obj)
+
+
+def cut_columns(obj, cells):
+    """Seams along the middle line of a grid."""
+    mesh = obj.data
+    middle = cells // 2
+    for edge in mesh.edges:
+        edge.use_seam = all(vertex // (cells + 1) == middle for vertex in edge.vertices)
+
+
+def is_cut(obj, edge_index):
+    """Whether the two faces at an edge have different UVs along it."""
+    corners = {}
+    uv = uvs(obj)
+    edge = obj.data.edges[edge_index]
+    for loop in obj.data.loops:
+        if loop.vertex_index in edge.vertices:
+            corners.setdefault(loop.vertex_index, {})[loop.index] = tuple(uv[loop.index])
+    faces = [face for face in obj.data.polygons if set(edge.vertices) <= set(face.vertices)]
+    for vertex in edge.vertices:
+        found = {corners[vertex][loop] for face in faces for loop in face.loop_indices if loop in corners[vertex]}
+        if len(found) > 1:
+            return True
+    return False
+
+
+def test_existing_seams_are_cut_on_request_only():
+    obj = grid(6)
+    cut_columns(obj, 6)
+    seams = [edge.index for edge in obj.data.edges if edge.use_seam]
+    assert len(seams) == 6
+    unwrap(use_seams=True)
+    assert all(is_cut(obj, index) for index in seams)
+    assert_good(obj)
+    unwrap(use_seams=False)
+    assert not any(is_cut(obj, index) for index in seams)
+
+
+def test_seams_of_the_result_are_marked_on_request():
+    obj = cube()
+    unwrap(mark_seams=True)
+    for edge in obj.data.edges:
+        assert edge.use_seam == is_cut(obj, edge.index)
+    assert any(edge.use_seam for edge in obj.data.edges)
+
+
+def test_non_uniform_scale_unwraps_what_is_seen():
+    obj = grid(8)
+    obj.scale = (4, 1, 1)
+    bpy.context.view_layer.update()
+    unwrap(margin=0.0, rotation="NONE")
+    uv = uvs(obj)
+    # The sheet is seen as 4 by 1: its UVs must be so too, in whichever direction they lie.
+    extent = np.sort(np.ptp(uv, axis=0))
+    assert extent[1] / extent[0] == pytest.approx(4, rel=0.01)
+    assert any("non-uniform scale" in text for status, text in certificate() if status == "WARN")
+
+
+def test_mirrored_object_is_not_flipped():
+    obj = sphere()
+    obj.scale = (-1, 1, 1)
+    bpy.context.view_layer.update()
+    unwrap()
+    assert_good(obj)
+
+
+def test_non_square_texture_keeps_proportions():
+    obj = grid(8)
+    unwrap(texture_size=(2048, 1024), margin=0.0, rotation="NONE")
+    extent = np.ptp(uvs(obj), axis=0) * (2048, 1024)
+    assert extent[0] / extent[1] == pytest.approx(1, rel=0.01)
+
+
+def test_empty_mesh():
+    obj = add_mesh("Empty", np.zeros((0, 3)), [])
+    before = fingerprint(obj)
+    refused("no faces")
+    assert fingerprint(obj) == before
+    assert len(obj.data.uv_layers) == 0
+
+
+def test_empty_mesh_among_others():
+    empty, full = add_mesh("Empty", np.zeros((0, 3)), []), cube()
+    select(empty, full)
+    assert unwrap() == {"FINISHED"}
+    assert_good(full)
+
+
+def test_degenerate_mesh_does_not_fail():
+    positions = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0), (5, 5, 5), (5, 5, 5), (5, 5, 5)]
+    obj = add_mesh("Degenerate", positions, [(0, 1, 2), (0, 1, 3), (4, 5, 6)])
+    assert unwrap() == {"FINISHED"}
+    assert np.isfinite(uvs(obj)).all()
+
+
+def test_vertex_that_is_not_finite_is_named_and_changes_nothing_or_is_reported():
+    obj = grid()
+    obj.data.vertices[10].co.x = float("nan")
+    before = fingerprint(obj)
+    try:
+        unwrap()
+    except RuntimeError as error:
+        assert "finite" in str(error)
+        assert len(obj.data.uv_layers) == 0
+    else:
+        assert any(status in {"BAD", "WARN"} for status, _ in certificate())
+        assert np.isfinite(uvs(obj)).all()
+    assert fingerprint(obj) == before
+
+
+def test_setting_out_of_range_of_the_engine_is_refused(addon):
+    """An error of the native module reaches the user in its own words, and no mesh is touched."""
+    obj = cube()
+    obj.data.uv_layers.new(name="UVMap")
+    before = uvs(obj).copy()
+    engine, task = addon("engine"), addon("task")
+    with pytest.raises(engine.EngineError, match="stretch_limit"):
+        task.UnwrapTask([obj], {"preset": "DEFAULT", "stretch_limit": 0.5}).run()
+    assert np.array_equal(uvs(obj), before)
+
+
+def test_topology_change_meanwhile_is_refused(addon):
+    obj = cube()
+    task = addon("task").UnwrapTask([obj], {"preset": "DEFAULT"})
+    result = task.run()
+    edit(obj)
+    bpy.ops.mesh.subdivide()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    with pytest.raises(addon("mesh_bridge").MeshError, match="edited meanwhile"):
+        task.write(result)
+    assert len(obj.data.uv_layers) == 0
+
+
+def test_removed_mesh_meanwhile_is_refused(addon):
+    obj = cube()
+    task = addon("task").UnwrapTask([obj], {"preset": "DEFAULT"})
+    result = task.run()
+    bpy.data.meshes.remove(obj.data)
+    with pytest.raises(addon("mesh_bridge").MeshError, match="removed meanwhile"):
+        task.write(result)
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_undo_and_redo_are_one_step(mode):
+    name = cube().name
+    obj = bpy.data.objects[name]
+    obj.data.uv_layers.new(name="UVMap")
+    before = uvs(obj).copy()
+    if mode == "EDIT":
+        edit(obj)
+    bpy.ops.ed.undo_push(message="before")
+    unwrap()
+    bpy.ops.ed.undo_push(message="unwrap")
+    bpy.ops.ed.undo()
+    obj = bpy.data.objects[name]
+    assert obj.mode == mode
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert np.array_equal(uvs(obj), before)
+
+
+def test_wrong_mode_is_refused_by_poll():
+    obj = cube()
+    bpy.ops.object.mode_set(mode="SCULPT")
+    assert not unwrap.poll()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert unwrap.poll()
+    obj.select_set(False)
+    assert not unwrap.poll()
+
+
+def test_job_reports_progress_and_cancels(addon):
+    obj = sphere(cells=64)
+    engine, task = addon("engine"), addon("task")
+    job = task.UnwrapTask([obj], {"preset": "DEFAULT"}).start()
+    seen = [job.progress()]
+    job.cancel()
+    with pytest.raises(engine.EngineCancelled):
+        job.result()
+    seen.append(job.progress())
+    assert all(0 <= value <= 1 for value in seen)
+    assert job.is_finished()
+    assert len(obj.data.uv_layers) == 0
+
+
+def test_same_uvs_for_any_number_of_threads(addon):
+    obj = sphere(cells=12)
+    results = [
+        addon("task").UnwrapTask([obj], {"preset": "DEFAULT"}, threads=threads).run().uv.tobytes() for threads in (1, 2, 3)
+    ]
+    assert results[0] == results[1] == results[2]
+
+
+def test_spiral_ramp_is_beyond_smart_uv_project(addon):
+    import demo_meshes
+
+    obj = demo_meshes.spiral_ramp()
+    comparison = addon("comparison")
+    rows = comparison.compare([obj], {})
+    assert rows["ble_unwrap"]["overlaps"] == 0
+    assert rows["ble_unwrap"]["blender_overlapping_faces"] == 0
+    assert rows["smart_uv_best"]["overlaps"] > 0
+    assert rows["smart_uv_best"]["blender_overlapping_faces"] > 0
