@@ -120,7 +120,12 @@ impl Raised for MeshError {
 impl Raised for PackError {
     fn kind(&self) -> Kind {
         match self {
-            Self::NotFinite { .. } | Self::CornerOutOfRange { .. } | Self::Full => Kind::Argument,
+            Self::TextureSize { .. }
+            | Self::Margin { .. }
+            | Self::MarginTooLarge { .. }
+            | Self::TooManyCharts { .. }
+            | Self::NotFinite { .. }
+            | Self::CornerOutOfRange { .. } => Kind::Argument,
             Self::Cancelled(error) => error.kind(),
         }
     }
