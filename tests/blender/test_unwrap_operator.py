@@ -77,7 +77,7 @@ def test_several_objects_share_one_atlas_and_one_density(addon):
         assert_good(obj)
     assert overlaps(addon, first, second) == 0
     density = [
-        triangle_areas(obj, uvs(obj)).sum() / (surface_areas(obj).sum() * obj.scale.x**2) for obj in (first, second)
+        triangle_areas(obj, uvs(obj)).sum() / (surface_areas(obj).sum() * obj.scale.x ** 2) for obj in (first, second)
     ]
     assert density[1] == pytest.approx(density[0], rel=0.05)
 
@@ -426,8 +426,7 @@ def test_job_reports_progress_and_cancels(addon):
 def test_same_uvs_for_any_number_of_threads(addon):
     obj = sphere(cells=12)
     results = [
-        addon("task").UnwrapTask([obj], {"preset": "DEFAULT"}, threads=threads).run().uv.tobytes()
-        for threads in (1, 2, 3)
+        addon("task").UnwrapTask([obj], {"preset": "DEFAULT"}, threads=threads).run().uv.tobytes() for threads in (1, 2, 3)
     ]
     assert results[0] == results[1] == results[2]
 
