@@ -26,11 +26,14 @@ MAY_USE = {
     "mesh": {"progress"},
     "geodesics": FOUNDATION,
     "distortion": FOUNDATION,
-    **{stage: TOOLS for stage in STAGES},
+    **dict.fromkeys(STAGES, TOOLS),
     "metrics": TOOLS - {"geodesics"},
-    "verify": TOOLS - {"geodesics"},
+    "verify": TOOLS - {"geodesics"} | {"metrics"},
+    "rounding": TOOLS - {"geodesics"},
+    "report": {"metrics"},
     # What sees the whole.
     "pipeline": None,
+    "standalone": None,
     "settings": None,
     "error": None,
     "lib": None,
@@ -39,7 +42,7 @@ MAY_USE = {
 MAY_NAME_TYPES_OF = {
     **{stage: set(STAGES[:i]) for i, stage in enumerate(STAGES)},
     "metrics": {"charts", "packing"},
-    "verify": {"charts", "packing", "metrics"},
+    "verify": {"charts", "packing"},
 }
 
 

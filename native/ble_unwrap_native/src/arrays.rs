@@ -18,8 +18,8 @@ pub(crate) struct Argument {
     pub(crate) shape: &'static str,
 }
 
-const REALS: &str = "float32 or float64";
-const INDICES: &str = "int32 or int64";
+const REALS: &str = "a float32 or float64";
+const INDICES: &str = "an int32 or int64";
 
 /// Rows of `N` real numbers, from float32 or float64 of shape (n, `N`).
 pub(crate) fn real_rows<const N: usize>(object: &Bound<'_, PyAny>, argument: Argument) -> PyResult<Vec<[f64; N]>> {
@@ -122,7 +122,7 @@ impl<'py> View<'py> {
         let Argument { name, shape } = argument;
         let buffer = PyUntypedBuffer::get(object).map_err(|_| {
             InvalidArgumentError::new_err(format!(
-                "{name}: expected a {expected} array of shape {shape}, found {}; pass a numpy array",
+                "{name}: expected {expected} array of shape {shape}, found {}; pass a numpy array",
                 type_name(object)
             ))
         })?;
@@ -219,7 +219,7 @@ fn scalar_of(buffer: &PyUntypedBuffer) -> Option<Scalar> {
 
 fn refusal(object: &Bound<'_, PyAny>, buffer: &PyUntypedBuffer, argument: Argument, expected: &str) -> PyErr {
     InvalidArgumentError::new_err(format!(
-        "{}: expected a {expected} array of shape {}, found {} of {} and shape {}",
+        "{}: expected {expected} array of shape {}, found {} of {} and shape {}",
         argument.name,
         argument.shape,
         type_name(object),

@@ -120,7 +120,12 @@ impl Raised for MeshError {
 impl Raised for PackError {
     fn kind(&self) -> Kind {
         match self {
-            Self::NotFinite { .. } | Self::CornerOutOfRange { .. } | Self::Full => Kind::Argument,
+            Self::TextureSize { .. }
+            | Self::Margin { .. }
+            | Self::MarginTooLarge { .. }
+            | Self::TooManyCharts { .. }
+            | Self::NotFinite { .. }
+            | Self::CornerOutOfRange { .. } => Kind::Argument,
             Self::Cancelled(error) => error.kind(),
         }
     }
@@ -132,6 +137,7 @@ impl Raised for UnwrapError {
             Self::Mesh(error) => error.kind(),
             Self::Setting { .. } => Kind::Argument,
             Self::Pack(error) => error.kind(),
+            Self::Check(_) => Kind::Mesh,
             Self::Cancelled(error) => error.kind(),
         }
     }

@@ -74,16 +74,13 @@ pub(crate) fn measure(
     let call = settings::from_keywords(settings, Function::Measure)?;
     let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, None)?;
     let uv = arrays::single_rows(uv, Argument { name: "uv", shape: "(c, 2)" })?;
-    let chart =
-        chart.map(|given| arrays::indices(given, Argument { name: "chart", shape: "(f,)" })).transpose()?;
+    let chart = chart.map(|given| arrays::indices(given, Argument { name: "chart", shape: "(f,)" })).transpose()?;
     let packing = call.settings.packing;
     let texture = Texture { width: packing.width, height: packing.height, margin: packing.margin_texels };
     let job = Job::given_or_new(py, job)?;
     job.get().start(
         call.threads,
-        move |progress| {
-            measure_layout(&mesh.input(), &uv, chart.as_deref(), texture, progress).map_err(Failure::from)
-        },
+        move |progress| measure_layout(&mesh.input(), &uv, chart.as_deref(), texture, progress).map_err(Failure::from),
         |py, layout| Ok(report::measures_to_dict(py, layout)?.into_any().unbind()),
     )?;
     job.get().finish(py)

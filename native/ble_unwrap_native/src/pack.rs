@@ -79,9 +79,7 @@ pub(crate) fn pack(
     let job = Job::given_or_new(py, job)?;
     job.get().start(
         call.threads,
-        move |progress| {
-            repack(&points, &triangles, &chart, &call.settings.packing, progress).map_err(Failure::from)
-        },
+        move |progress| repack(&points, &triangles, &chart, &call.settings.packing, progress).map_err(Failure::from),
         |py, repacked| {
             let report = PyDict::new(py);
             report.set_item("charts", repacked.charts)?;

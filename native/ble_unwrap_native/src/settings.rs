@@ -224,8 +224,11 @@ impl Setting {
             }
             Field::Real(field, interval) => *field(call) = real(name, value, *interval, "")?,
             Field::OptionalReal(field, interval) => {
-                *field(call) =
-                    if value.is_none() { None } else { Some(real(name, value, *interval, ", or None for the model's own")?) };
+                *field(call) = if value.is_none() {
+                    None
+                } else {
+                    Some(real(name, value, *interval, ", or None for the model's own")?)
+                };
             }
             Field::Whole(field, range) => *field(call) = whole(name, value, *range, "")?,
             Field::Limit(field, range) => {
