@@ -14,6 +14,7 @@ from scenes import (
     grid,
     n_gons,
     select,
+    set_uvs,
     sphere,
     surface_areas,
     triangle_areas,
@@ -113,6 +114,24 @@ def test_linked_duplicates_are_unwrapped_once(addon):
     assert_good(first)
 
 
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_copies_of_the_mesh_are_left_alone(mode):
+    """Blender shares the arrays of copied meshes until one is written: writing must not reach through."""
+    obj = sphere("A")
+    obj.data.uv_layers.new(name="UVMap")
+    copy = obj.copy()
+    copy.data = obj.data.copy()
+    bpy.context.collection.objects.link(copy)
+    select(obj)
+    before, seams = uvs(copy).copy(), fingerprint(copy)
+    if mode == "EDIT":
+        edit(obj)
+    unwrap(mark_seams=True)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert np.array_equal(uvs(copy), before)
+    assert fingerprint(copy) == seams
+
+
 def test_selected_faces_only():
     obj = grid(6, bump=0.3)
     unwrap()
@@ -142,7 +161,7 @@ def test_selection_keeps_its_place_in_the_texture():
     obj = grid(6)
     unwrap()
     values = uvs(obj) * np.float32(0.25) + np.float32((0.5, 0.125))
-    obj.data.uv_layers.active.uv.foreach_set("vector", values.reshape(-1))
+    set_uvs(obj, values)
     edit(obj)
     assert unwrap(use_original_bounds=True, texture_size=(1024, 1024), margin=2.0) == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
