@@ -1,9 +1,47 @@
 //! BLE Unwrap: automatic UV unwrapping by Bernoulli logistic embedding.
+//!
+//! [`unwrap()`] takes a polygon mesh ([`MeshInput`]) to an [`Atlas`]: a UV for every polygon corner, in few
+//! charts, each with bounded stretch, without flips and overlap. The stages are public, too: they are
+//! listed here in the order in which data passes through them.
+//!
+//! | stage | module |
+//! |---|---|
+//! | any polygons to an oriented manifold | [`mesh`] |
+//! | distances on the surface | [`geodesics`] |
+//! | where to cut | [`segmentation`], [`charts`] |
+//! | Bernoulli logistic embedding, the paper's method | [`embedding`] |
+//! | no flips, least stretch | [`stretch`] |
+//! | charts into the unit square | [`packing`] |
+//! | single precision, proof, figures | [`rounding`], [`verify()`], [`metrics`] |
+//!
+//! The paper: *Bernoulli Embedding Model and Its Application in Texture Mapping*, revised 2006. Where a
+//! stage follows it, its documentation names section and equation.
 #![forbid(unsafe_code)]
 
+pub mod charts;
 pub mod distortion;
+pub mod embedding;
+mod error;
 pub mod geodesics;
+pub mod linalg;
 pub mod mesh;
+pub mod metrics;
+pub mod packing;
+mod pipeline;
 mod progress;
+pub mod standalone;
+pub mod stretch;
+mod report;
+pub mod rounding;
+pub mod segmentation;
+mod settings;
+pub mod stretch;
+mod verify;
 
+pub use error::UnwrapError;
+pub use mesh::{MeshError, MeshInput};
+pub use pipeline::{Atlas, Rung, Rungs, unwrap};
 pub use progress::{Cancelled, Progress, Stage};
+pub use report::Report;
+pub use settings::{ChartScale, Holes, Settings};
+pub use verify::{Certificate, Defect, verify};

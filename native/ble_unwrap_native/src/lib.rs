@@ -1,1 +1,43 @@
-//! py
+//! Python bindings of BLE Unwrap: converts, calls the core, converts back. Registration alone is here.
+
+mod arrays;
+mod distances;
+mod embed;
+mod errors;
+mod job;
+mod measure;
+mod owned_array;
+mod pack;
+mod report;
+mod settings;
+mod unwrap;
+mod words;
+
+/// Automatic UV unwrapping under a stretch bound, by Bernoulli logistic embedding.
+#[pyo3::pymodule]
+mod ble_unwrap_native {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::distances::geodesic_distances;
+    #[pymodule_export]
+    use crate::embed::{Embedding, embed};
+    #[pymodule_export]
+    use crate::job::Job;
+    #[pymodule_export]
+    use crate::measure::measure;
+    #[pymodule_export]
+    use crate::owned_array::Array;
+    #[pymodule_export]
+    use crate::pack::{PackedCharts, pack};
+    #[pymodule_export]
+    use crate::settings::default_settings;
+    #[pymodule_export]
+    use crate::unwrap::{Atlas, submit_unwrap, unwrap};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        crate::errors::register(module)
+    }
+}

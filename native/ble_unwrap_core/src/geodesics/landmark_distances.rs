@@ -54,6 +54,12 @@ impl LandmarkDistances {
         &self.rows[l * self.vertex_count..(l + 1) * self.vertex_count]
     }
 
+    /// All distances, row after row.
+    #[must_use]
+    pub fn into_rows(self) -> Vec<f32> {
+        self.rows
+    }
+
     /// Distance from landmark number `l` to `v`.
     #[inline]
     #[must_use]

@@ -2,11 +2,24 @@
 //!
 //! Knows nothing of charts, UVs or stages.
 
+mod condition;
+mod defects;
+mod ear_clipping;
+mod glue;
 mod groups;
 mod index;
+mod input;
 pub mod measure;
+mod orient;
+#[cfg(test)]
+pub(crate) mod test_surfaces;
 mod tri_mesh;
+mod triangulate;
+mod weld;
 
+pub use condition::{ConditionOptions, Surface, condition};
+pub use defects::{Defect, Defects};
 pub use groups::Groups;
 pub use index::{FaceId, HalfedgeId, VertexId};
+pub use input::{MeshError, MeshInput};
 pub use tri_mesh::{Topology, TriMesh};

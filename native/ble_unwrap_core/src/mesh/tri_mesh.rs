@@ -150,25 +150,58 @@ impl TriMesh {
 
     /// The part of the mesh made of `faces` (in this order), cut along every edge for which
     /// `is_cut` holds (asked once a side). Returns it with the source of each vertex; face `i` of
-    /// the part is `faces[i]`. O(|faces|) plus one flat array over all faces.
+    /// the part is `faces[i]`. O(m log m) in the number m of faces of the part.
     #[must_use]
     pub fn submesh(&self, faces: &[FaceId], is_cut: impl Fn(HalfedgeId) -> bool) -> (Self, Vec<VertexId>) {
-        let mut local = vec![u32::MAX; self.face_count()];
-        for (i, f) in faces.iter().enumerate() {
-            local[f.index()] = FaceId::new(i).index() as u32;
+        let mut local: Vec<(FaceId, usize)> = faces.iter().enumerate().map(|(i, &f)| (f, i)).collect();
+        local.sort_unstable();
+        let whole = faces.len() == self.face_count() && faces.iter().enumerate().all(|(i, f)| f.index() == i);
+        let find = |f: FaceId| {
+            if whole {
+                return Some(f.index());
+            }
+            local.binary_search_by_key(&f, |e| e.0).ok().map(|at| local[at].1)
+        };
+        self.glue_part(faces, |h, t| if is_cut(h) || is_cut(t) { None } else { find(t.face()) })
+    }
+
+    /// The parts of the mesh made of the faces of each group, cut apart from each other. As
+    /// [`TriMesh::submesh`] of each group, but all together O(n).
+    ///
+    /// # Panics
+    /// If the groups hold a face twice.
+    #[must_use]
+    pub fn partition(&self, groups: &Groups<FaceId>) -> Vec<(Self, Vec<VertexId>)> {
+        let mut place = vec![(u32::MAX, 0usize); self.face_count()];
+        for (g, faces) in groups.iter().enumerate() {
+            for (i, f) in faces.iter().enumerate() {
+                assert_eq!(place[f.index()].0, u32::MAX, "{f} is in two groups");
+                place[f.index()] = (FaceId::new(g).index() as u32, i);
+            }
         }
+        let part = |(g, faces): (usize, &[FaceId])| {
+            self.glue_part(faces, |_, t| {
+                let (group, local) = place[t.face().index()];
+                (group as usize == g).then_some(local)
+            })
+        };
+        groups.iter().enumerate().map(part).collect()
+    }
+
+    /// `across(h, twin)` gives the local index of the face beyond `h`, if it is glued there.
+    fn glue_part(
+        &self,
+        faces: &[FaceId],
+        across: impl Fn(HalfedgeId, HalfedgeId) -> Option<usize>,
+    ) -> (Self, Vec<VertexId>) {
         let mut corner_source = Vec::with_capacity(3 * faces.len());
         let mut twin = Vec::with_capacity(3 * faces.len());
         for &f in faces {
             for h in f.halfedges() {
                 corner_source.push(self.from(h).index() as u32);
                 let t = self.twin(h);
-                let glued = !t.is_none() && local[t.face().index()] != u32::MAX && !is_cut(h) && !is_cut(t);
-                twin.push(if glued {
-                    FaceId::new(local[t.face().index()] as usize).halfedge(t.slot())
-                } else {
-                    HalfedgeId::NONE
-                });
+                let local = if t.is_none() { None } else { across(h, t) };
+                twin.push(local.map_or(HalfedgeId::NONE, |f| FaceId::new(f).halfedge(t.slot())));
             }
         }
         let (mesh, source) = Self::from_glued(&corner_source, twin, |s| self.positions[s as usize]);

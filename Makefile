@@ -1,0 +1,66 @@
+# make test   everything: Rust, the wheel, Python without Blender, the add-on in every bpy that can be had
+# make demo   unwrap the demonstration meshes and compare with Smart UV Project: out/
+# Knobs: PYTHON (3.11 or later), CARGO, MESH=file for the demo, BLENDER=/path/to/blender for a real one instead of bpy.
+
+PYTHON ?= python3
+CARGO ?= cargo
+VENV := .venv-py
+BIN := $(VENV)/bin
+WHEELS := addon/wheels
+# What the wheel is made of. Official Blender runs on glibc 2.28, which zig links against on any newer system.
+NATIVE := Cargo.toml Cargo.lock $(shell find native -name '*.rs' -o -name '*.toml' -o -name '*.pyi' 2>/dev/null)
+
+.PHONY: test test-rust test-python test-blender lint format venv wheel zip demo bench clean
+
+test: test-rust lint test-python test-blender
+
+test-rust:
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --workspace --all-targets --locked -- -D warnings
+	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --workspace --no-deps --locked --document-private-items
+	$(CARGO) test --locked
+
+test-python: $(VENV)/.wheel
+	$(BIN)/python -m pytest tests --ignore=tests/blender
+
+test-blender: zip
+	.ci/blender_libraries
+	$(PYTHON) .ci/test_blender
+
+lint: $(VENV)/.ready
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+format: $(VENV)/.ready
+	$(CARGO) fmt --all
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+venv: $(VENV)/.ready
+
+wheel: $(WHEELS)/.built
+
+zip: wheel
+	$(BIN)/python .ci/build_extension
+
+demo: zip
+	.ci/blender_libraries
+	$(PYTHON) .ci/demo $(MESH)
+
+bench:
+	$(CARGO) bench -p ble_unwrap_core
+
+clean:
+	rm -rf target out .cache $(VENV) $(WHEELS)/*.whl $(WHEELS)/.built
+
+$(VENV)/.ready: .ci/requirements.txt
+	PYTHON="$(PYTHON)" .ci/make_venv $(VENV) -r .ci/requirements.txt
+	touch $@
+
+$(WHEELS)/.built: $(NATIVE) $(VENV)/.ready
+	.ci/build_wheel $(BIN) $(WHEELS)
+	touch $@
+
+$(VENV)/.wheel: $(WHEELS)/.built
+	$(BIN)/pip install --quiet --force-reinstall --no-deps --no-index $(WHEELS)/*.whl
+	touch $@

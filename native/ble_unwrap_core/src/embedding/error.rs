@@ -1,0 +1,100 @@
+//! What can go wrong in an embedding.
+
+use thiserror::Error;
+
+use crate::linalg::EigenError;
+use crate::mesh::VertexId;
+use crate::progress::Cancelled;
+
+/// Why there is no embedding.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+pub enum EmbeddingError {
+    /// Fewer than three landmarks do not span a plane.
+    #[error("{found} landmarks do not span a plane; at least 3 are needed")]
+    TooFewLandmarks {
+        /// How many there are.
+        found: usize,
+    },
+    /// No path leads from a landmark to a vertex: the chart is not connected, or the distance is no number.
+    #[error("the distance from landmark {landmark} to {vertex} is {value}: the chart is not connected")]
+    Unreachable {
+        /// The landmark.
+        landmark: VertexId,
+        /// The vertex.
+        vertex: VertexId,
+        /// The distance found.
+        value: f64,
+    },
+    /// All distances are zero, or too small to square.
+    #[error("all points lie at distance zero of each other")]
+    NoExtent,
+    /// The landmarks lie on a line, as far as their distances tell.
+    #[error("the landmarks lie on a line: the second principal axis is {ratio:.1e} of the first")]
+    Collinear {
+        /// Extent along the second axis over that along the first.
+        ratio: f64,
+    },
+    /// A parameter is out of range.
+    #[error("{name} is {value}, but must be {expected}")]
+    InvalidSetting {
+        /// Name of the parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its range.
+        expected: &'static str,
+    },
+    /// An array has the wrong number of values.
+    #[error("expected {expected} values, found {found}")]
+    WrongLength {
+        /// Number needed.
+        expected: usize,
+        /// Number given.
+        found: usize,
+    },
+    /// A coordinate is infinite or not a number, or so large that its square is.
+    #[error("component {component} of point {point} is not finite or too large to square")]
+    NotFinite {
+        /// Number of the point.
+        point: usize,
+        /// Number of the component; one past the coordinates for the intercept.
+        component: usize,
+    },
+    /// A distance is negative, infinite or not a number, or too large to square.
+    #[error("the distance from point {row} to point {column} is {value}; it must be finite and not negative")]
+    DistanceOutOfRange {
+        /// First point.
+        row: usize,
+        /// Second point.
+        column: usize,
+        /// The distance.
+        value: f64,
+    },
+    /// An affinity lies outside [0, 1] or is not a number.
+    #[error("the affinity of points {row} and {column} is {value}; it must lie between 0 and 1")]
+    AffinityOutOfRange {
+        /// First point.
+        row: usize,
+        /// Second point.
+        column: usize,
+        /// The affinity.
+        value: f64,
+    },
+    /// There must be more points than dimensions.
+    #[error("{points} points do not span {dimensions} dimensions")]
+    TooFewPoints {
+        /// Number of points.
+        points: usize,
+        /// Number of dimensions asked for.
+        dimensions: usize,
+    },
+    /// Isomap fits no likelihood; classical scaling is [`classical_mds`](crate::linalg::classical_mds).
+    #[error("Isomap fits no likelihood; use classical scaling")]
+    NoLikelihood,
+    /// The eigenvalues of the double-centred distances could not be had.
+    #[error(transparent)]
+    Eigen(#[from] EigenError),
+    /// Asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}

@@ -1,0 +1,120 @@
+//! An undirected graph with edge lengths, in compressed rows.
+
+use crate::mesh::TriMesh;
+
+/// An undirected graph with a length for each edge: the neighbours of node v and the lengths to them
+/// are two parallel slices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WeightedGraph {
+    offsets: Vec<usize>,
+    targets: Vec<u32>,
+    lengths: Vec<f64>,
+}
+
+impl WeightedGraph {
+    /// A graph of `n` nodes from edges (u, v, length), each given once and stored both ways. Of
+    /// several edges between the same nodes the shortest is kept. Left out: loops, edges to nodes that
+    /// are not there, lengths that are negative or no number. O(n + m log m).
+    #[must_use]
+    pub fn from_edges(n: usize, edges: impl IntoIterator<Item = (usize, usize, f64)>) -> Self {
+        let mut arcs = Vec::new();
+        for (u, v, length) in edges {
+            if u < n && v < n && u != v && length >= 0.0 {
+                arcs.push((u, v, length));
+                arcs.push((v, u, length));
+            }
+        }
+        arcs.sort_unstable_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)));
+        arcs.dedup_by_key(|a| (a.0, a.1));
+        let mut offsets = vec![0; n + 1];
+        for &(u, _, _) in &arcs {
+            offsets[u + 1] += 1;
+        }
+        for u in 0..n {
+            offsets[u + 1] += offsets[u];
+        }
+        Self {
+            offsets,
+            targets: arcs.iter().map(|a| a.1 as u32).collect(),
+            lengths: arcs.iter().map(|a| a.2).collect(),
+        }
+    }
+
+    /// The vertices and edges of a mesh.
+    #[must_use]
+    pub fn of_mesh(mesh: &TriMesh) -> Self {
+        let edges = mesh.edges().map(|h| (mesh.from(h).index(), mesh.to(h).index(), mesh.edge_length(h)));
+        Self::from_edges(mesh.vertex_count(), edges)
+    }
+
+    /// Number of nodes.
+    #[must_use]
+    pub fn node_count(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// Number of edges.
+    #[must_use]
+    pub fn edge_count(&self) -> usize {
+        self.targets.len() / 2
+    }
+
+    /// The neighbours of a node, ascending, with the lengths to them.
+    #[inline]
+    pub fn neighbours(&self, node: usize) -> impl ExactSizeIterator<Item = (usize, f64)> + '_ {
+        let row = self.offsets[node]..self.offsets[node + 1];
+        self.targets[row.clone()].iter().map(|&t| t as usize).zip(self.lengths[row].iter().copied())
+    }
+
+    /// A component label for each node and the number of components; labels ascend with the lowest
+    /// node. A graph that measures distances must have one.
+    #[must_use]
+    pub fn components(&self) -> (Vec<u32>, usize) {
+        let mut label = vec![u32::MAX; self.node_count()];
+        let mut count = 0;
+        let mut stack = Vec::new();
+        for seed in 0..self.node_count() {
+            if label[seed] != u32::MAX {
+                continue;
+            }
+            label[seed] = count;
+            stack.push(seed);
+            while let Some(u) = stack.pop() {
+                for (v, _) in self.neighbours(u) {
+                    if label[v] == u32::MAX {
+                        label[v] = count;
+                        stack.push(v);
+                    }
+                }
+            }
+            count += 1;
+        }
+        (label, count as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::test_surfaces::grid;
+
+    #[test]
+    fn edges_go_both_ways_and_bad_ones_are_left_out() {
+        let g = WeightedGraph::from_edges(
+            4,
+            [(0, 1, 2.0), (1, 0, 1.0), (2, 2, 1.0), (2, 9, 1.0), (2, 3, f64::NAN), (2, 3, -1.0)],
+        );
+        assert_eq!(g.edge_count(), 1);
+        assert_eq!(g.neighbours(1).collect::<Vec<_>>(), [(0, 1.0)]);
+        assert_eq!(g.neighbours(0).collect::<Vec<_>>(), [(1, 1.0)]);
+        assert_eq!(g.components(), (vec![0, 0, 1, 2], 3));
+    }
+
+    #[test]
+    fn mesh_graph_has_the_edges_of_the_mesh() {
+        let mesh = grid(3, 4, [1.0, 1.0], 0.0);
+        let g = WeightedGraph::of_mesh(&mesh);
+        assert_eq!((g.node_count(), g.edge_count()), (mesh.vertex_count(), mesh.topology().edges));
+        assert_eq!(g.components().1, 1);
+    }
+}

@@ -1,0 +1,14 @@
+//! Linear algebra over faer and on plain arrays: no mesh types, no stage.
+//!
+//! Sparse symmetric solves, symmetric eigenpairs, classical scaling. Dense matrices are flat slices, row by
+//! row.
+
+mod classical_mds;
+mod sparse;
+mod symmetric;
+mod vector_state;
+
+pub use classical_mds::{Mds, classical_mds};
+pub use sparse::{SparseCholesky, SparseError, SparsePattern};
+pub use symmetric::{EigenError, Eigenpairs, leading_eigenpairs};
+pub use vector_state::restore_vector_state;

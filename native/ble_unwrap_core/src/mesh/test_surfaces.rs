@@ -1,0 +1,150 @@
+//! Small surfaces of known shape and topology for unit tests.
+
+use std::collections::HashMap;
+
+use nalgebra::Point3;
+
+use super::TriMesh;
+
+/// A mesh from clean triangles; vertices are numbered by first use.
+pub(crate) fn mesh(positions: &[Point3<f64>], triangles: &[[u32; 3]]) -> TriMesh {
+    TriMesh::from_triangles(positions, triangles).0
+}
+
+/// A flat rectangle of `nx`×`ny` cells, `shear` tilting the columns (large values make obtuse
+/// triangles). Bounds: x in [0, `size`\[0\]] plus the shear, y in [0, `size`\[1\]].
+pub(crate) fn grid(nx: usize, ny: usize, size: [f64; 2], shear: f64) -> TriMesh {
+    let point = |i: usize, j: usize| {
+        let (x, y) = (size[0] * i as f64 / nx as f64, size[1] * j as f64 / ny as f64);
+        Point3::new(x + shear * y, y, 0.0)
+    };
+    patch(nx, ny, false, false, point)
+}
+
+/// An open cylinder of radius 1 around z with `m` columns and `n` rows.
+pub(crate) fn cylinder(m: usize, n: usize, height: f64) -> TriMesh {
+    patch(m, n, true, false, |i, j| {
+        let a = std::f64::consts::TAU * i as f64 / m as f64;
+        Point3::new(a.cos(), a.sin(), height * j as f64 / n as f64)
+    })
+}
+
+/// A torus of radii 1 and `minor`.
+pub(crate) fn torus(m: usize, n: usize, minor: f64) -> TriMesh {
+    patch(m, n, true, true, |i, j| {
+        let a = std::f64::consts::TAU * i as f64 / m as f64;
+        let b = std::f64::consts::TAU * j as f64 / n as f64;
+        let r = 1.0 + minor * b.cos();
+        Point3::new(r * a.cos(), r * a.sin(), minor * b.sin())
+    })
+}
+
+/// Quadrilaterals over a grid, each cut along one diagonal, closed in either direction.
+fn patch(m: usize, n: usize, close_i: bool, close_j: bool, point: impl Fn(usize, usize) -> Point3<f64>) -> TriMesh {
+    let columns = if close_i { m } else { m + 1 };
+    let rows = if close_j { n } else { n + 1 };
+    let at = |i: usize, j: usize| ((j % rows) * columns + i % columns) as u32;
+    let positions: Vec<_> =
+        (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).map(|(i, j)| point(i, j)).collect();
+    let mut triangles = Vec::new();
+    for j in 0..n {
+        for i in 0..m {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    mesh(&positions, &triangles)
+}
+
+/// The unit sphere: an icosahedron, each face split into four `levels` times.
+pub(crate) fn sphere(levels: usize) -> TriMesh {
+    let g = 0.5 * (1.0 + 5.0_f64.sqrt());
+    let mut positions: Vec<Point3<f64>> = Vec::new();
+    for (a, b) in [(1.0, g), (-1.0, g), (1.0, -g), (-1.0, -g)] {
+        positions.extend([Point3::new(0.0, a, b), Point3::new(a, b, 0.0), Point3::new(b, 0.0, a)]);
+    }
+    for p in &mut positions {
+        p.coords.normalize_mut();
+    }
+    // The faces of the icosahedron are its triples of mutually nearest vertices.
+    let near = |i: usize, j: usize| (positions[i] - positions[j]).norm() < 1.1;
+    let mut triangles = Vec::new();
+    for i in 0..12 {
+        for j in i + 1..12 {
+            for k in j + 1..12 {
+                if near(i, j) && near(j, k) && near(i, k) {
+                    let [a, b, c] = [i, j, k].map(|v| positions[v].coords);
+                    let outward = a.dot(&b.cross(&c)) > 0.0;
+                    triangles.push(if outward { [i, j, k] } else { [i, k, j] }.map(|v| v as u32));
+                }
+            }
+        }
+    }
+    for _ in 0..levels {
+        let mut middle = HashMap::new();
+        let mut split = Vec::new();
+        for t in &triangles {
+            let m = [0, 1, 2].map(|k| {
+                let (a, b) = (t[k], t[(k + 1) % 3]);
+                *middle.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                    let sum = positions[a as usize].coords + positions[b as usize].coords;
+                    positions.push(sum.normalize().into());
+                    positions.len() as u32 - 1
+                })
+            });
+            split.extend([[t[0], m[0], m[2]], [m[0], t[1], m[1]], [m[2], m[1], t[2]], m]);
+        }
+        triangles = split;
+    }
+    mesh(&positions, &triangles)
+}
+
+/// The boundary of a solid of unit cubes in a box of `size` cubes, two triangles a square; triangles
+/// 2i and 2i + 1 make up square i. Cubes must not meet at an edge or a corner only.
+pub(crate) fn cubes(size: [usize; 3], filled: impl Fn([usize; 3]) -> bool) -> TriMesh {
+    let is_filled =
+        |c: [isize; 3]| c.iter().zip(size).all(|(&x, s)| x >= 0 && (x as usize) < s) && filled(c.map(|x| x as usize));
+    let mut vertex = HashMap::new();
+    let mut positions = Vec::new();
+    let mut triangles = Vec::new();
+    for z in 0..size[2] as isize {
+        for y in 0..size[1] as isize {
+            for x in 0..size[0] as isize {
+                if !is_filled([x, y, z]) {
+                    continue;
+                }
+                for axis in 0..3 {
+                    for side in [0, 1] {
+                        let mut across = [x, y, z];
+                        across[axis] += 2 * side - 1;
+                        if is_filled(across) {
+                            continue;
+                        }
+                        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+                        let mut square = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(du, dv)| {
+                            let mut p = [x, y, z];
+                            p[axis] += side;
+                            p[u] += du;
+                            p[v] += dv;
+                            *vertex.entry(p).or_insert_with(|| {
+                                positions.push(Point3::new(p[0] as f64, p[1] as f64, p[2] as f64));
+                                positions.len() as u32 - 1
+                            })
+                        });
+                        if side == 0 {
+                            square.reverse();
+                        }
+                        let [a, b, c, d] = square;
+                        triangles.extend([[a, b, c], [a, c, d]]);
+                    }
+                }
+            }
+        }
+    }
+    mesh(&positions, &triangles)
+}
+
+/// A plate of unit cubes with `holes` square holes: genus `holes`.
+pub(crate) fn plate(holes: usize) -> TriMesh {
+    cubes([2 * holes + 1, 3, 1], |[x, y, _]| !(x % 2 == 1 && y == 1))
+}

@@ -1,0 +1,361 @@
+//! The figures of a layout.
+//!
+//! Sander, Snyder, Gortler, Hoppe: Texture mapping progressive meshes, SIGGRAPH 2001, section 3, for
+//! the stretch; definitions otherwise as in the project's independent evaluator.
+
+use nalgebra::Point3;
+use rayon::prelude::*;
+
+use crate::progress::{Cancelled, Progress};
+
+use super::gap::{GAP_SEARCH_TEXELS, OwnedSegment, least_gap};
+use super::overlap::overlaps;
+use super::uv_mesh::UvMesh;
+use super::uv_topology::{NONE, UvTopology};
+
+/// A triangle is degenerate when its height over its longest edge is at most this share of the
+/// bounding box diagonal (on the surface) or of the larger extent (in UV): float32 coordinates
+/// resolve no less.
+pub(crate) const DEGENERATE: f64 = 1e-7;
+/// Share of the layout's box that two triangles must have in common to count as an overlap.
+const OVERLAP_SHARE: f64 = 1e-9;
+/// Charts with less of the surface than this do not compete for the worst stretch.
+const SPECK: f64 = 1e-4;
+/// How far outside the unit square coordinates may lie before the layout counts as out of range.
+const RANGE_SLACK: f64 = 1e-5;
+
+/// The figures of one chart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChartMeasures {
+    /// Lowest triangle of the chart.
+    pub first_triangle: usize,
+    /// The label given for that triangle.
+    pub label: i32,
+    /// Number of triangles.
+    pub faces: usize,
+    /// Share of the measured surface.
+    pub area_share: f64,
+    /// L2 stretch at the chart's best scale; NaN where nothing could be measured.
+    pub l2: f64,
+}
+
+/// The figures of a layout. Distortions are weighted by surface area over the *measured* triangles:
+/// with finite UVs and degenerate neither on the surface nor in UV; NaN if there are none. A flipped
+/// triangle enters them with the absolute value of its area.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measures {
+    /// Charts: sets of triangles connected over UV edges.
+    pub charts: usize,
+    /// Islands: charts connected over UV vertices. Gaps and overlaps "between" are between islands.
+    pub islands: usize,
+    /// All triangles.
+    pub faces: usize,
+    /// Triangles without a finite UV at each corner.
+    pub unmapped_faces: usize,
+    /// Of these, triangles whose label promises a UV, but which have NaN or an infinity there.
+    pub nonfinite_faces: usize,
+    /// Triangles degenerate on the surface (or with a vertex that is not finite).
+    pub degenerate_faces: usize,
+    /// Triangles degenerate in UV that are not on the surface: their stretch is infinite and left out.
+    pub uv_degenerate_faces: usize,
+    /// L2 stretch at the best scale of the whole layout; at least 1.
+    pub l2: f64,
+    /// L2 stretch with every chart at its own best scale.
+    pub l2_chart_scale: f64,
+    /// L2 stretch of the worst chart at its best scale, charts under 1e-4 of the surface aside.
+    pub l2_worst_chart: f64,
+    /// Label of the lowest triangle of that chart.
+    pub worst_chart: Option<i32>,
+    /// L-infinity stretch: the largest singular value of any UV→surface map, at the layout's scale.
+    pub l_infinity: f64,
+    /// Mean of ½(σ₁/σ₂ + σ₂/σ₁); 1 is conformal.
+    pub angle_distortion: f64,
+    /// Mean of ½(ρ + 1/ρ), ρ the area ratio at the layout's scale; 1 is equal area.
+    pub area_distortion: f64,
+    /// Triangles oriented against the majority (by surface area) of their chart, after making the
+    /// winding of the input consistent inside the chart.
+    pub flips: usize,
+    /// Pairs of triangles that share more than 1e-9 of the layout's box.
+    pub overlaps: u64,
+    /// Of these, pairs in different islands.
+    pub overlaps_between: u64,
+    /// False if there were too many overlaps to count (millions): the two figures above are then
+    /// lower bounds.
+    pub overlaps_complete: bool,
+    /// Length of the seams over the square root of the surface area. The mesh's own boundary is none.
+    pub seam_length: f64,
+    /// Length of the seams in units of the mesh.
+    pub seam_length_absolute: f64,
+    /// Covered share of the unit square; for a layout outside it, of its bounding square.
+    pub packing_efficiency: f64,
+    /// Least distance between two islands in texels; the search limit (eight, or twice the margin)
+    /// if it is more, 0 if boundaries cross.
+    pub gap_texels: f64,
+    /// False if the gap search hit its bound of work; the gap is then an upper bound.
+    pub gap_complete: bool,
+    /// Least and greatest coordinate along u and v; NaN without UVs.
+    pub uv_box: [[f64; 2]; 2],
+    /// Charts, numbered by lowest triangle.
+    pub per_chart: Vec<ChartMeasures>,
+}
+
+/// Measures a layout.
+///
+/// UVs are taken in the proportions of the texture, so a layout for a 2:1 texture that shows no
+/// distortion on the surface has none here either. A UV unit is `width`×`height` texels even where the
+/// layout leaves the unit square.
+///
+/// Guaranteed: no number in `mesh` makes it panic, and the result does not depend on the number of
+/// threads. Not guaranteed: exactness. Overlaps below the threshold go unseen; [`verify`](crate::verify())
+/// is exact. O(n log n); about two seconds for a million triangles on two cores.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Cancelled> {
+    let m = mesh.triangle_count();
+    let (positions, unit) = unit_positions(mesh);
+    progress.check()?;
+    let topology = UvTopology::new(mesh, &positions);
+    progress.check()?;
+
+    let aspect = mesh.texture().aspect();
+    let mut uv_box = [[f64::NAN; 2]; 2];
+    let uv: Vec<[[f64; 2]; 3]> = (0..m)
+        .into_par_iter()
+        .map(|f| match mesh.corner_uv(f) {
+            Some(uv) if topology.chart[f] != NONE => uv.map(|p| [0, 1].map(|k| f64::from(p[k]) * aspect[k])),
+            _ => [[f64::NAN; 2]; 3],
+        })
+        .collect();
+    for p in uv.iter().flatten() {
+        // `min` and `max` prefer numbers to NaN.
+        uv_box =
+            [[0, 1].map(|k| uv_box[0][k].min(p[k] / aspect[k])), [0, 1].map(|k| uv_box[1][k].max(p[k] / aspect[k]))];
+    }
+    let extent = [0, 1].map(|k| (uv_box[1][k] - uv_box[0][k]) * aspect[k]);
+    let longest_extent = extent[0].max(extent[1]);
+    let faces: Vec<FaceMeasures> = (0..m)
+        .into_par_iter()
+        .map(|f| FaceMeasures::new(mesh.triangles()[f].map(|v| positions[v as usize]), uv[f], longest_extent))
+        .collect();
+    progress.check()?;
+
+    let surface: f64 = faces.iter().map(|f| f.area).sum();
+    let mut out = Measures {
+        charts: topology.chart_count,
+        islands: topology.island_count,
+        faces: m,
+        unmapped_faces: topology.chart.iter().filter(|&&c| c == NONE).count(),
+        nonfinite_faces: topology.nonfinite,
+        degenerate_faces: faces.iter().filter(|f| f.degenerate).count(),
+        uv_degenerate_faces: faces.iter().filter(|f| !f.degenerate && f.uv_degenerate).count(),
+        l2: f64::NAN,
+        l2_chart_scale: f64::NAN,
+        l2_worst_chart: f64::NAN,
+        worst_chart: None,
+        l_infinity: f64::NAN,
+        angle_distortion: f64::NAN,
+        area_distortion: f64::NAN,
+        flips: flips(&faces, &topology),
+        overlaps: 0,
+        overlaps_between: 0,
+        overlaps_complete: true,
+        seam_length: topology.seam_length / surface.sqrt(),
+        seam_length_absolute: topology.seam_length * unit,
+        packing_efficiency: 0.0,
+        gap_texels: 0.0,
+        gap_complete: true,
+        uv_box,
+        per_chart: Vec::new(),
+    };
+    stretch(&mut out, mesh, &faces, &topology);
+
+    let mapped: Vec<usize> = (0..m).filter(|&f| topology.chart[f] != NONE).collect();
+    let triangles: Vec<[[f64; 2]; 3]> = mapped.iter().map(|&f| uv[f]).collect();
+    let island: Vec<u32> = mapped.iter().map(|&f| topology.island[f]).collect();
+    let layout_box = extent[0].max(1e-30) * extent[1].max(1e-30);
+    let common = overlaps(&triangles, &island, OVERLAP_SHARE * layout_box, progress)?;
+    out.overlaps = common.pairs;
+    out.overlaps_between = common.between;
+    out.overlaps_complete = common.complete;
+
+    let covered = (mapped.iter().map(|&f| faces[f].uv_double_area.abs()).sum::<f64>() * 0.5 - common.area).max(0.0);
+    let inside = (0..2).all(|k| uv_box[0][k] >= -RANGE_SLACK && uv_box[1][k] <= 1.0 + RANGE_SLACK);
+    let whole = if inside { aspect[0] * aspect[1] } else { longest_extent.max(1e-30).powi(2) };
+    out.packing_efficiency = covered / whole;
+
+    let texels = mesh.texture().texels();
+    let segments: Vec<OwnedSegment> = topology
+        .boundary
+        .iter()
+        .map(|&h| {
+            let (f, k) = (h as usize / 3, h as usize % 3);
+            let ends = [uv[f][k], uv[f][(k + 1) % 3]].map(|p| [0, 1].map(|k| p[k] / aspect[k] * texels[k]));
+            OwnedSegment { ends, owner: topology.island[f] }
+        })
+        .collect();
+    let limit = GAP_SEARCH_TEXELS.max(2.0 * mesh.texture().margin);
+    (out.gap_texels, out.gap_complete) = least_gap(&segments, limit, progress)?;
+    Ok(out)
+}
+
+/// What one triangle contributes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct FaceMeasures {
+    /// Area on the surface; 0 if it is not finite.
+    area: f64,
+    degenerate: bool,
+    /// Twice the signed area in UV; 0 without UV.
+    uv_double_area: f64,
+    /// False without UV.
+    uv_degenerate: bool,
+    mapped: bool,
+    /// Singular values of the UV→surface map, larger first, and its squared Frobenius norm.
+    singular: [f64; 2],
+    squared_norm: f64,
+}
+
+impl FaceMeasures {
+    /// `p` in units of the bounding box diagonal, `uv` NaN where there is none.
+    fn new(p: [Point3<f64>; 3], uv: [[f64; 2]; 3], extent: f64) -> Self {
+        let (e1, e2) = (p[1] - p[0], p[2] - p[0]);
+        let double_area = e1.cross(&e2).norm();
+        let longest = e1.norm().max(e2.norm()).max((p[2] - p[1]).norm());
+        // NaN is degenerate.
+        let solid = double_area > DEGENERATE * longest;
+        let sub = |a: [f64; 2], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
+        let (d1, d2, d3) = (sub(uv[1], uv[0]), sub(uv[2], uv[0]), sub(uv[2], uv[1]));
+        let det = d1[0] * d2[1] - d1[1] * d2[0];
+        let mapped = !det.is_nan();
+        let uv_longest = d1[0].hypot(d1[1]).max(d2[0].hypot(d2[1])).max(d3[0].hypot(d3[1]));
+        let uv_solid = det.abs() > DEGENERATE * extent * uv_longest;
+        let su = (e1 * d2[1] - e2 * d1[1]) / det;
+        let sv = (e2 * d1[0] - e1 * d2[0]) / det;
+        let (a, b, c) = (su.norm_squared(), su.dot(&sv), sv.norm_squared());
+        let larger = (0.5 * ((a + c) + (a - c).hypot(2.0 * b))).sqrt();
+        // From the area ratio, which is stable where the small singular value is tiny.
+        let smaller = double_area / det.abs() / larger;
+        Self {
+            area: if double_area.is_finite() { 0.5 * double_area } else { 0.0 },
+            degenerate: !solid,
+            uv_double_area: if mapped { det } else { 0.0 },
+            uv_degenerate: mapped && !uv_solid,
+            mapped,
+            singular: [larger, smaller],
+            squared_norm: a + c,
+        }
+    }
+
+    fn measured(&self) -> bool {
+        self.mapped && !self.degenerate && !self.uv_degenerate
+    }
+}
+
+/// The positions moved and scaled so that the box of the used vertices has diagonal 1, and the factor
+/// back. Keeps every square in range for coordinates up to 1e300.
+fn unit_positions(mesh: &UvMesh) -> (Vec<Point3<f64>>, f64) {
+    let positions = mesh.positions();
+    let mut used = vec![false; positions.len()];
+    for &v in mesh.triangles().iter().flatten() {
+        used[v as usize] = true;
+    }
+    let mut lo = Point3::from([f64::INFINITY; 3]);
+    let mut hi = Point3::from([f64::NEG_INFINITY; 3]);
+    for p in positions.iter().zip(&used).filter(|(p, u)| **u && p.iter().all(|x| x.is_finite())).map(|(p, _)| p) {
+        lo = lo.inf(p);
+        hi = hi.sup(p);
+    }
+    // Halved first: the difference of two finite numbers may overflow.
+    let half = hi.coords * 0.5 - lo.coords * 0.5;
+    let middle = hi.coords * 0.5 + lo.coords * 0.5;
+    let largest = half.amax();
+    if !(largest > 0.0 && largest.is_finite()) {
+        return (positions.to_vec(), 1.0);
+    }
+    let diagonal = 2.0 * (half / largest).norm();
+    let moved = positions.par_iter().map(|p| Point3::from((p.coords - middle) / largest / diagonal)).collect();
+    (moved, diagonal * largest)
+}
+
+/// Triangles oriented against the majority of their chart.
+fn flips(faces: &[FaceMeasures], topology: &UvTopology) -> usize {
+    let sign = |f: usize| {
+        if topology.against[f] { -faces[f].uv_double_area.signum() } else { faces[f].uv_double_area.signum() }
+    };
+    let mut vote = vec![0.0; topology.chart_count];
+    for f in (0..faces.len()).filter(|&f| faces[f].measured()) {
+        vote[topology.chart[f] as usize] += sign(f) * faces[f].area;
+    }
+    (0..faces.len())
+        .filter(|&f| faces[f].measured() && (sign(f) > 0.0) != (vote[topology.chart[f] as usize] >= 0.0))
+        .count()
+}
+
+/// Fills in the figures that are means over measured triangles.
+fn stretch(out: &mut Measures, mesh: &UvMesh, faces: &[FaceMeasures], topology: &UvTopology) {
+    #[derive(Clone, Copy)]
+    struct Sums {
+        first: usize,
+        faces: usize,
+        energy: f64,
+        area: f64,
+        uv_area: f64,
+    }
+    let empty = Sums { first: usize::MAX, faces: 0, energy: 0.0, area: 0.0, uv_area: 0.0 };
+    let mut chart = vec![empty; topology.chart_count];
+    let mut all = empty;
+    let (mut largest, mut angle) = (0.0f64, 0.0);
+    for (f, face) in faces.iter().enumerate().filter(|(_, face)| face.mapped) {
+        let c = &mut chart[topology.chart[f] as usize];
+        c.first = c.first.min(f);
+        c.faces += 1;
+        if !face.measured() {
+            continue;
+        }
+        let [s1, s2] = face.singular;
+        for s in [c, &mut all] {
+            s.energy += 0.5 * face.squared_norm * face.area;
+            s.area += face.area;
+            s.uv_area += 0.5 * face.uv_double_area.abs();
+        }
+        largest = largest.max(s1);
+        angle += 0.5 * (s1 / s2 + s2 / s1) * face.area;
+    }
+    let l2 = |s: &Sums| (s.energy / s.area * (s.uv_area / s.area)).sqrt();
+    out.per_chart = chart
+        .iter()
+        .map(|s| ChartMeasures {
+            first_triangle: s.first,
+            label: mesh.label(s.first),
+            faces: s.faces,
+            area_share: if all.area > 0.0 { s.area / all.area } else { 0.0 },
+            l2: l2(s),
+        })
+        .collect();
+    if all.area == 0.0 {
+        return;
+    }
+    let density = all.uv_area / all.area;
+    out.l2 = l2(&all);
+    out.l2_chart_scale = chart.iter().map(|s| (s.energy * s.uv_area).sqrt()).sum::<f64>() / all.area;
+    for c in out.per_chart.iter().filter(|c| c.area_share > SPECK) {
+        if out.l2_worst_chart.is_nan() || c.l2 > out.l2_worst_chart {
+            out.l2_worst_chart = c.l2;
+            out.worst_chart = Some(c.label);
+        }
+    }
+    out.l_infinity = largest * density.sqrt();
+    out.angle_distortion = angle / all.area;
+    let area: f64 = faces
+        .iter()
+        .filter(|f| f.measured())
+        .map(|f| {
+            let ratio = 0.5 * f.uv_double_area.abs() / f.area / density;
+            0.5 * (ratio + 1.0 / ratio) * f.area
+        })
+        .sum();
+    out.area_distortion = area / all.area;
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,171 @@
+//! In which angles a chart is tried.
+
+use std::f64::consts::FRAC_PI_2;
+
+use nalgebra::Point2;
+
+use super::Rotation;
+use super::outline::Outline;
+
+/// Angles tried besides the minimum-area rectangle's, for large charts, as shares of a quarter turn.
+/// Quarter turns of each come for free, so two of them are eight poses.
+const MORE_ANGLES: [f64; 2] = [1.0 / 3.0, 2.0 / 3.0];
+/// Angles tried for a chart alone in the texture: the placement is the pose.
+const ALONE: usize = 32;
+
+/// Cosine and sine of the base angles of a chart; the other poses are quarter turns of these.
+///
+/// The first lays the minimum-area rectangle flat ([`Rotation::Any`]) or is the given pose.
+pub(super) fn base_turns(outline: &Outline, rotation: Rotation, large: bool, alone: bool) -> Vec<[f64; 2]> {
+    if rotation != Rotation::Any {
+        return vec![[1.0, 0.0]];
+    }
+    let first = flat_turn(outline);
+    let mut turns = vec![first];
+    let mut add = |share: f64| {
+        let (s, c) = (share * FRAC_PI_2).sin_cos();
+        turns.push([first[0] * c - first[1] * s, first[1] * c + first[0] * s]);
+    };
+    if alone {
+        (1..ALONE).for_each(|k| add(k as f64 / ALONE as f64));
+    } else if large {
+        MORE_ANGLES.into_iter().for_each(add);
+    }
+    turns
+}
+
+/// Turn that lays the rectangle of least area around the outline along the axes, its longer side
+/// along x. Freeman and Shapira: Determining the minimum-area encasing rectangle for an arbitrary
+/// closed curve, CACM 18(7), 1975 (one side lies on an edge of the hull); rotating calipers after
+/// Toussaint, 1983. O(n log n).
+fn flat_turn(outline: &Outline) -> [f64; 2] {
+    let hull = convex_hull(&outline.points);
+    let n = hull.len();
+    if n < 2 {
+        return [1.0, 0.0];
+    }
+    let edge = |k: usize| hull[(k + 1) % n] - hull[k];
+    let (mut right, mut top, mut left) = (0, 0, 0);
+    let mut best = (f64::INFINITY, [1.0, 0.0]);
+    for k in 0..n {
+        let length = edge(k).norm();
+        if !(length > 0.0) {
+            continue;
+        }
+        let along = edge(k) / length;
+        let up = nalgebra::Vector2::new(-along.y, along.x);
+        // Each caliper only advances: at most n steps altogether, bounded here by 2n for rounding.
+        let advance = |at: &mut usize, dir: nalgebra::Vector2<f64>| {
+            for _ in 0..2 * n {
+                if edge(*at % n).dot(&dir) <= 0.0 {
+                    break;
+                }
+                *at += 1;
+            }
+        };
+        right = right.max(k);
+        advance(&mut right, along);
+        top = top.max(right);
+        advance(&mut top, up);
+        left = left.max(top);
+        advance(&mut left, -along);
+        let width = (hull[right % n] - hull[left % n]).dot(&along);
+        let height = (hull[top % n] - hull[k]).dot(&up);
+        if width * height < best.0 {
+            // Turn `along` onto x, or onto −y where the rectangle is taller than wide.
+            let turn = if width >= height { [along.x, -along.y] } else { [along.y, along.x] };
+            best = (width * height, turn);
+        }
+    }
+    best.1
+}
+
+/// Convex hull, counter-clockwise, without collinear points (Andrew's monotone chain).
+fn convex_hull(points: &[Point2<f64>]) -> Vec<Point2<f64>> {
+    let mut sorted = points.to_vec();
+    sorted.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    sorted.dedup();
+    if sorted.len() < 3 {
+        return sorted;
+    }
+    let mut hull: Vec<Point2<f64>> = Vec::new();
+    let chain = |hull: &mut Vec<Point2<f64>>, keep: usize, p: Point2<f64>| {
+        while hull.len() > keep {
+            let (a, b) = (hull[hull.len() - 2], hull[hull.len() - 1]);
+            if (b - a).perp(&(p - a)) > 0.0 {
+                break;
+            }
+            hull.pop();
+        }
+        hull.push(p);
+    };
+    for &p in &sorted {
+        chain(&mut hull, 1, p);
+    }
+    let lower = hull.len();
+    for &p in sorted.iter().rev().skip(1) {
+        chain(&mut hull, lower, p);
+    }
+    hull.pop();
+    hull
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packing::PackItem;
+    use proptest::prelude::*;
+
+    fn outline(points: &[Point2<f64>]) -> Outline {
+        let triangles: Vec<[u32; 3]> = (1..points.len() as u32 - 1).map(|k| [0, k, k + 1]).collect();
+        Outline::new(&PackItem { points, triangles: &triangles }, 0).expect("valid")
+    }
+
+    fn size(points: &[Point2<f64>], [c, s]: [f64; 2]) -> [f64; 2] {
+        let mut r = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
+        for p in points {
+            let q = [c * p.x - s * p.y, s * p.x + c * p.y];
+            r = [r[0].min(q[0]), r[1].min(q[1]), r[2].max(q[0]), r[3].max(q[1])];
+        }
+        [r[2] - r[0], r[3] - r[1]]
+    }
+
+    #[test]
+    fn a_turned_rectangle_is_laid_flat() {
+        for angle in [0.0, 0.3, 1.2, 2.0, 3.0, 4.0, 5.5] {
+            let turn = nalgebra::Rotation2::new(angle);
+            let points: Vec<_> =
+                [[0.0, 0.0], [5.0, 0.0], [5.0, 2.0], [0.0, 2.0]].iter().map(|&[x, y]| turn * Point2::new(x, y)).collect();
+            let [w, h] = size(&points, flat_turn(&outline(&points)));
+            assert!((w - 5.0).abs() < 1e-9 && (h - 2.0).abs() < 1e-9, "{w} by {h} at {angle}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_turn_gives_a_smaller_rectangle(coords in prop::collection::vec((-1.0f64..1.0, -1.0f64..1.0), 3..20)) {
+            let points: Vec<_> = coords.iter().map(|&(x, y)| Point2::new(x, y)).collect();
+            let o = outline(&points);
+            let [w, h] = size(&o.points, flat_turn(&o));
+            prop_assert!(w >= h - 1e-12);
+            for k in 0..500 {
+                let (s, c) = (k as f64 * FRAC_PI_2 / 500.0).sin_cos();
+                let [a, b] = size(&o.points, [c, s]);
+                prop_assert!(w * h <= a * b + 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn turns_are_rotations_and_as_many_as_asked() {
+        let points = [Point2::new(0.0, 0.0), Point2::new(3.0, 1.0), Point2::new(1.0, 2.0)];
+        let o = outline(&points);
+        let turns = base_turns(&o, Rotation::Any, true, false);
+        assert_eq!(turns.len(), 3);
+        assert!(turns.iter().all(|[c, s]| (c * c + s * s - 1.0).abs() < 1e-14));
+        assert_eq!(base_turns(&o, Rotation::Any, false, false).len(), 1);
+        assert_eq!(base_turns(&o, Rotation::Quarter, true, true), vec![[1.0, 0.0]]);
+        let empty = Outline::new(&PackItem { points: &[], triangles: &[] }, 0).expect("empty");
+        assert_eq!(base_turns(&empty, Rotation::Any, false, false), vec![[1.0, 0.0]]);
+    }
+}

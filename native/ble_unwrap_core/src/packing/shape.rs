@@ -1,0 +1,122 @@
+//! A chart at one density: its footprints on the grid in every pose to try.
+
+use nalgebra::Vector2;
+
+use super::Pose;
+use super::cover::{Square, cover};
+use super::mask::Mask;
+use super::outline::Outline;
+use super::raster::rasterise;
+
+/// Distance in texels by which charts are grown before they are rasterised, in the maximum norm.
+/// Half of what a pair of charts has over the margin; rounding a coordinate of a texture of
+/// [`PackSettings::LARGEST_SIZE`](super::PackSettings::LARGEST_SIZE) texels to f32 moves it by
+/// 1/1024 texel at most.
+pub(super) const SAFETY_TEXELS: f64 = 1.0 / 128.0;
+
+/// Extent to which smaller charts are grown, in texels: with the safety on both sides one texel.
+const SPECK_TEXELS: f64 = 1.0 - 4.0 * SAFETY_TEXELS;
+
+/// Footprints of up to this many cells in either direction are filled to their box: they then are
+/// all alike, and a chart like one placed before is found a place where that search ended.
+const BOX_CELLS: usize = 6;
+
+/// A footprint: the cells of a chart in one pose.
+#[derive(Clone, Debug)]
+pub(super) struct Footprint {
+    pub(super) mask: Mask,
+    pub(super) squares: Vec<Square>,
+    /// Number of its cells.
+    pub(super) cells: usize,
+    /// Mean row of its cells.
+    pub(super) centre_y: f64,
+    /// Chart plane to cells of the mask.
+    to_cells: Pose,
+}
+
+/// A chart at one density.
+#[derive(Clone, Debug)]
+pub(super) struct Shape {
+    /// Poses to try, in order of preference.
+    pub(super) footprints: Vec<Footprint>,
+    /// Cells covered.
+    pub(super) cells: usize,
+    /// Whether the chart was scaled up to a texel.
+    pub(super) is_speck: bool,
+}
+
+impl Shape {
+    /// Footprints at `density` texels to a unit of the chart plane, on cells of `cell` texels.
+    pub(super) fn new(outline: &Outline, turns: &[[f64; 2]], quarters: bool, density: f64, cell: f64) -> Self {
+        let extent = density * outline.extent;
+        let is_speck = outline.extent > 0.0 && !(extent >= SPECK_TEXELS);
+        // Cells to an outline unit; a chart without extent is a point at any scale.
+        let scale = if outline.extent == 0.0 { density } else { extent.max(SPECK_TEXELS) } / cell;
+        let mut footprints: Vec<Footprint> = Vec::new();
+        // Without triangles there is nothing to place.
+        for &turn in turns.iter().filter(|_| !outline.edges.is_empty()) {
+            let raster = rasterise(outline, turn, scale, SAFETY_TEXELS / cell);
+            let mut mask = raster.mask;
+            let tiny = mask.width().max(mask.height()) <= BOX_CELLS;
+            if tiny {
+                mask = Mask::full(mask.width(), mask.height());
+            }
+            let mut squares = cover(&mask);
+            let mut to_cells = Pose {
+                cos: turn[0],
+                sin: turn[1],
+                centre: outline.centre,
+                scale: scale / outline.unit(),
+                offset: Vector2::from(raster.shift),
+            };
+            for quarter in 0..4 {
+                if quarter > 0 {
+                    squares = squares.iter().map(|q| q.quarter_turn(mask.height())).collect();
+                    to_cells = to_cells.quarter_turn(mask.height() as f64);
+                    mask = mask.quarter_turn();
+                }
+                if !footprints.iter().any(|f| f.mask == mask) {
+                    footprints.push(Footprint::new(mask.clone(), squares.clone(), to_cells));
+                }
+                if tiny || !quarters {
+                    break;
+                }
+            }
+            if tiny {
+                break;
+            }
+        }
+        let cells = footprints.first().map_or(0, |f| f.cells);
+        Self { footprints, cells, is_speck }
+    }
+}
+
+impl Footprint {
+    fn new(mask: Mask, squares: Vec<Square>, to_cells: Pose) -> Self {
+        let (mut moment, mut cells) = (0.0, 0);
+        for y in 0..mask.height() {
+            let count: usize = mask.row(y).iter().map(|w| w.count_ones() as usize).sum();
+            moment += (y as f64 + 0.5) * count as f64;
+            cells += count;
+        }
+        Self { mask, squares, cells, centre_y: moment / cells.max(1) as f64, to_cells }
+    }
+
+    /// Chart plane to texels with the mask's corner at cell (x, y), cells of `cell` texels, and the
+    /// grid's corner at `border` texels.
+    pub(super) fn pose(&self, x: usize, y: usize, cell: f64, border: f64) -> Pose {
+        let mut pose = self.to_cells;
+        let corner = Vector2::new(x as f64, y as f64);
+        pose.scale *= cell;
+        pose.offset = (pose.offset + corner) * cell + Vector2::repeat(border);
+        pose
+    }
+}
+
+impl Pose {
+    /// Followed by a quarter turn of a frame of the given height, whose corner stays at the origin.
+    fn quarter_turn(self, height: f64) -> Self {
+        let offset = Vector2::new(height - self.offset.y, self.offset.x);
+        Self { cos: -self.sin, sin: self.cos, offset, ..self }
+    }
+}

@@ -1,0 +1,199 @@
+//! Surface to charts: flatten a patch, accept the chart or split the patch, until all are charts.
+
+use std::cell::OnceCell;
+
+use rayon::prelude::*;
+
+use crate::charts::{self, Chart, Patch};
+use crate::geodesics::{self, LandmarkDistances};
+use crate::mesh::{HalfedgeId, Topology};
+use crate::progress::{Cancelled, Progress, Stage};
+use crate::segmentation::{self, SpectralAnalysis};
+use crate::settings::{Holes, Settings};
+
+use super::flatten;
+use super::rungs::{Rung, Rungs};
+
+/// Patches less planar than this are split before any flattening: a cap of 90° has 0.85, and an
+/// attempt to flatten it ends above an L2 of 1.1 (measured on caps).
+const LEAST_PLANARITY: f64 = 0.85;
+/// Spectral splits that deep have not helped; halving by breadth-first order always ends.
+const MOST_SPECTRAL_SPLITS: u32 = 24;
+/// Below this many faces a patch is not worth a cut for its handles: it is split.
+const LEAST_FACES_TO_CUT: usize = 8;
+
+/// The charts of a surface and how they came about.
+pub(super) struct Charting {
+    pub(super) charts: Vec<Chart>,
+    /// For each chart, the split in two that it came out of, if any.
+    pub(super) family: Vec<Option<u32>>,
+    pub(super) rungs: Rungs,
+}
+
+struct Piece {
+    patch: Patch,
+    splits: u32,
+    family: Option<u32>,
+}
+
+enum Step {
+    Accept(Box<Chart>),
+    Split(Vec<Patch>),
+}
+
+/// Cuts and flattens patches until every chart is under the limit. Rounds over all open pieces, in
+/// parallel; a piece is split into two or more of fewer polygons, so there are at most as many rounds
+/// as polygons, and in practice some ten. Charts come sorted by lowest face.
+pub(super) fn chart(patches: Vec<Patch>, settings: &Settings, progress: &Progress) -> Result<Charting, Cancelled> {
+    let total: usize = patches.iter().map(|p| p.faces.len()).sum();
+    let mut open: Vec<Piece> = patches.into_iter().map(|patch| Piece { patch, splits: 0, family: None }).collect();
+    let mut accepted: Vec<(Chart, Option<u32>)> = Vec::new();
+    let mut rungs = Rungs::default();
+    let (mut done, mut split_count) = (0, 0);
+    while !open.is_empty() {
+        // The largest first, so that no long piece starts last.
+        open.sort_by_key(|p| (std::cmp::Reverse(p.patch.faces.len()), p.patch.faces[0]));
+        let steps: Vec<Result<(Step, Rungs), Cancelled>> =
+            open.par_iter().with_max_len(1).map(|piece| step(piece, settings, progress)).collect();
+        let mut next = Vec::new();
+        for (piece, taken) in open.iter().zip(steps) {
+            let (outcome, steps) = taken?;
+            rungs.add(&steps);
+            match outcome {
+                Step::Accept(chart) => {
+                    done += chart.patch.faces.len();
+                    accepted.push((*chart, piece.family));
+                }
+                Step::Split(patches) => {
+                    let family = (patches.len() == 2).then_some(split_count);
+                    split_count += 1;
+                    next.extend(patches.into_iter().map(|patch| Piece { patch, splits: piece.splits + 1, family }));
+                }
+            }
+        }
+        open = next;
+        progress.advance(Stage::Charts, done as f64 / total.max(1) as f64);
+    }
+    accepted.sort_by_key(|(c, _)| c.patch.faces[0]);
+    let (charts, family) = accepted.into_iter().unzip();
+    Ok(Charting { charts, family, rungs })
+}
+
+/// Flattens a patch as it is or with the cuts its topology needs; `None` where no such chart would be
+/// under the limit.
+pub(super) fn try_chart(
+    patch: &Patch,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Progress,
+) -> Result<Option<Chart>, Cancelled> {
+    Attempt::new(patch, settings, progress).run(rungs)
+}
+
+fn step(piece: &Piece, settings: &Settings, progress: &Progress) -> Result<(Step, Rungs), Cancelled> {
+    progress.check()?;
+    let (patch, splits) = (&piece.patch, piece.splits);
+    let mut rungs = Rungs::default();
+    let attempt = Attempt::new(patch, settings, progress);
+    if patch.is_one_polygon() {
+        let chart = attempt.polygon(&mut rungs)?;
+        return Ok((Step::Accept(Box::new(chart)), rungs));
+    }
+    if let Some(chart) = attempt.run(&mut rungs)? {
+        return Ok((Step::Accept(Box::new(chart)), rungs));
+    }
+    let parts = if splits < MOST_SPECTRAL_SPLITS {
+        rungs.take(Rung::Split);
+        let (distances, analysis) = attempt.analysis()?;
+        let cuts = &settings.segmentation;
+        segmentation::segment(&patch.mesh, &patch.polygon, distances, analysis, splits == 0, cuts, progress)?
+    } else {
+        rungs.take(Rung::Bisect);
+        segmentation::bisect(&patch.mesh, &patch.polygon)
+    };
+    Ok((Step::Split(patch.split(&parts.label, parts.parts)), rungs))
+}
+
+/// One patch under trial: its topology, and its distances once somebody asks.
+struct Attempt<'a> {
+    patch: &'a Patch,
+    topology: Topology,
+    settings: &'a Settings,
+    progress: &'a Progress,
+    measured: OnceCell<(LandmarkDistances, SpectralAnalysis)>,
+}
+
+impl<'a> Attempt<'a> {
+    fn new(patch: &'a Patch, settings: &'a Settings, progress: &'a Progress) -> Self {
+        Self { patch, topology: patch.mesh.topology(), settings, progress, measured: OnceCell::new() }
+    }
+
+    fn analysis(&self) -> Result<&(LandmarkDistances, SpectralAnalysis), Cancelled> {
+        if let Some(known) = self.measured.get() {
+            return Ok(known);
+        }
+        let fresh = analyse(self.patch, self.settings, self.progress)?;
+        Ok(self.measured.get_or_init(|| fresh))
+    }
+
+    /// A chart whatever its stretch, for a patch that cannot be split.
+    fn polygon(&self, rungs: &mut Rungs) -> Result<Chart, Cancelled> {
+        let flat = match flatten::isometric(self.patch, rungs) {
+            Some(flat) => flat,
+            None => flatten::flatten_polygon(self.patch, &self.analysis()?.0, self.settings, rungs, self.progress)?,
+        };
+        Ok(flat.into_chart(self.patch.clone()))
+    }
+
+    /// As it is if its topology allows, else, or if that does not do, cut open to a disk.
+    fn run(&self, rungs: &mut Rungs) -> Result<Option<Chart>, Cancelled> {
+        let as_it_is = self.topology.is_disk() || (self.topology.is_chart() && self.settings.holes == Holes::Keep);
+        if as_it_is {
+            if let Some(flat) = flatten::isometric(self.patch, rungs) {
+                return Ok(Some(flat.into_chart(self.patch.clone())));
+            }
+            let (distances, analysis) = self.analysis()?;
+            if analysis.planarity >= LEAST_PLANARITY {
+                let flat = flatten::flatten(self.patch, distances, self.settings, rungs, self.progress)?;
+                if let Some(flat) = flat {
+                    return Ok(Some(flat.into_chart(self.patch.clone())));
+                }
+            }
+        }
+        // A closed blob does not flatten from one cut, and a few faces are not worth one.
+        let blob = self.topology.loops == 0 && self.topology.genus() == 0;
+        if self.topology.is_disk() || blob || self.patch.faces.len() < LEAST_FACES_TO_CUT {
+            return Ok(None);
+        }
+        self.run_cut(rungs)
+    }
+
+    /// Opens handles and joins holes to the outside, then flattens the disk that is left.
+    fn run_cut(&self, rungs: &mut Rungs) -> Result<Option<Chart>, Cancelled> {
+        if true {
+            return Ok(None);
+        }
+        let edges: Vec<HalfedgeId> = Vec::new();
+        let disk = self.patch.cut(&edges);
+        rungs.take(Rung::CutOpen);
+        if let Some(flat) = flatten::isometric(&disk, rungs) {
+            return Ok(Some(flat.into_chart(disk)));
+        }
+        let (distances, analysis) = analyse(&disk, self.settings, self.progress)?;
+        if analysis.planarity < LEAST_PLANARITY {
+            return Ok(None);
+        }
+        let flat = flatten::flatten(&disk, &distances, self.settings, rungs, self.progress)?;
+        Ok(flat.map(|flat| flat.into_chart(disk)))
+    }
+}
+
+fn analyse(
+    patch: &Patch,
+    settings: &Settings,
+    progress: &Progress,
+) -> Result<(LandmarkDistances, SpectralAnalysis), Cancelled> {
+    let distances = geodesics::landmark_distances(&patch.mesh, &settings.geodesics, progress)?;
+    let analysis = SpectralAnalysis::new(&distances);
+    Ok((distances, analysis))
+}

@@ -1,0 +1,256 @@
+//! Charts to atlas: scale, pack, round, check, and mend what the checks find.
+
+use std::collections::BTreeSet;
+
+use nalgebra::{Point2, Point3};
+
+use crate::charts::{Chart, Patch};
+use crate::distortion;
+use crate::error::UnwrapError;
+use crate::mesh::{FaceId, MeshInput, Surface, measure};
+use crate::metrics::{self, Texture, UvMesh, UvMeshError};
+use crate::packing::{self, PackItem, Packed};
+use crate::progress::{Cancelled, Progress, Stage};
+use crate::report::Report;
+use crate::rounding::{self, Rounding};
+use crate::segmentation;
+use crate::settings::{ChartScale, Settings};
+use crate::verify::{self, Certificate};
+
+use super::rungs::{Rung, Rungs};
+use super::{Atlas, Clock, charting};
+
+/// Rounds of packing, checking and mending. Needles that rounding breaks are gone after one; the rest
+/// is for charts whose parts break again.
+const MOST_ROUNDS: usize = 6;
+/// Texel densities of charts differ by no more than this from uniform, either way.
+const MOST_SCALE: f64 = 2.0;
+
+/// Packs the charts and proves the result.
+pub(super) fn finish(
+    input: &MeshInput<'_>,
+    surface: &Surface,
+    mut charts: Vec<Chart>,
+    mut rungs: Rungs,
+    settings: &Settings,
+    mut clock: Clock,
+    progress: &Progress,
+) -> Result<Atlas, UnwrapError> {
+    let arrays = Arrays::new(input, surface);
+    let mut round = 0;
+    loop {
+        progress.enter(Stage::Pack);
+        scale(&mut charts, settings);
+        let layout = Layout::new(input, surface, &charts, settings, progress)?;
+        clock.lap("pack");
+        progress.enter(Stage::Verify);
+        let mesh = arrays.uv_mesh(&layout, settings)?;
+        let certificate = verify::verify(&mesh, &surface.reversed, progress)?;
+        let faulty: BTreeSet<usize> =
+            certificate.faulty_charts.iter().filter_map(|&c| usize::try_from(c).ok()).collect();
+        round += 1;
+        if (faulty.is_empty() && layout.broken.is_empty()) || round == MOST_ROUNDS {
+            let measures = metrics::measure(&mesh, progress)?;
+            clock.lap("verify");
+            let mut report = Report::new(&measures, settings.stretch_limit);
+            report.faces = input.face_offsets.len().saturating_sub(1);
+            report.unmapped_faces = surface.unmapped.len();
+            report.warnings = warnings(surface, &layout, &certificate);
+            report.rungs = rungs.taken();
+            report.seconds = clock.laps;
+            progress.enter(Stage::Done);
+            return Ok(Atlas { uv: layout.uv, chart: layout.polygon_chart, report });
+        }
+        charts = mend(surface, charts, &faulty, &layout, &mut rungs, settings, progress)?;
+        clock.lap("mend");
+    }
+}
+
+/// Brings each chart to the area of its surface, and to the density that its stretch asks for.
+fn scale(charts: &mut [Chart], settings: &Settings) {
+    for chart in charts {
+        let mesh = &chart.patch.mesh;
+        let corners = |f| mesh.triangle(f).map(|v| chart.uv[v.index()]);
+        let flat: f64 = mesh.faces().map(|f| 0.5 * distortion::signed_double_area(corners(f))).sum();
+        let area = chart.patch.area();
+        if !(flat > 0.0 && area > 0.0) {
+            continue;
+        }
+        let mut factor = (area / flat).sqrt();
+        if settings.chart_scale == ChartScale::Stretch {
+            factor *= chart.l2.sqrt().clamp(1.0 / MOST_SCALE, MOST_SCALE);
+        }
+        for p in &mut chart.uv {
+            *p *= factor;
+        }
+    }
+}
+
+/// The input as one list of triangles, for the checks.
+struct Arrays {
+    positions: Vec<Point3<f64>>,
+    triangles: Vec<[u32; 3]>,
+    corner_triangles: Vec<[u32; 3]>,
+}
+
+impl Arrays {
+    fn new(input: &MeshInput<'_>, surface: &Surface) -> Self {
+        let corner_triangles: Vec<[u32; 3]> = surface.corner.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
+        let vertex = |c: u32| u32::try_from(input.corner_vertices[c as usize]).unwrap_or(0);
+        Self {
+            positions: input.positions.iter().map(|&p| Point3::from(p)).collect(),
+            triangles: corner_triangles.iter().map(|c| c.map(vertex)).collect(),
+            corner_triangles,
+        }
+    }
+
+    fn uv_mesh<'a>(&'a self, layout: &'a Layout, settings: &Settings) -> Result<UvMesh<'a>, UvMeshError> {
+        let pack = &settings.packing;
+        let texture = Texture { width: pack.width, height: pack.height, margin: pack.margin_texels };
+        let (positions, triangles, corners) = (&self.positions, &self.triangles, &self.corner_triangles);
+        UvMesh::new(positions, triangles, &layout.uv, corners, &layout.face_chart, texture)
+    }
+}
+
+/// Charts packed and rounded.
+struct Layout {
+    uv: Vec<[f32; 2]>,
+    face_chart: Vec<i32>,
+    polygon_chart: Vec<i32>,
+    /// Faces (of the surface) that rounding turned over, with their chart.
+    broken: Vec<(usize, FaceId)>,
+    specks: usize,
+}
+
+impl Layout {
+    fn new(
+        input: &MeshInput<'_>,
+        surface: &Surface,
+        charts: &[Chart],
+        settings: &Settings,
+        progress: &Progress,
+    ) -> Result<Self, UnwrapError> {
+        let packed = pack(charts, settings, progress)?;
+        let size = packed.size.map(f64::from);
+        let rounding = Rounding { texel: size.map(|s| 1.0 / s), diagonal: diagonal(surface) };
+        let mut layout = Self {
+            uv: vec![[0.0; 2]; input.corner_vertices.len()],
+            face_chart: vec![-1; surface.mesh.face_count()],
+            polygon_chart: vec![-1; input.face_offsets.len().saturating_sub(1)],
+            broken: Vec::new(),
+            specks: packed.specks,
+        };
+        for (number, (chart, pose)) in charts.iter().zip(&packed.poses).enumerate() {
+            progress.check()?;
+            let place = |p: &Point2<f64>| {
+                let texel = pose.texel(*p);
+                Point2::new(texel.x / size[0], texel.y / size[1])
+            };
+            let exact: Vec<Point2<f64>> = chart.uv.iter().map(place).collect();
+            let uv = match rounding::round_to_f32(&chart.patch.mesh, &exact, &rounding) {
+                Ok(rounded) => rounded.uv,
+                Err(unmendable) => {
+                    let faces = unmendable.faces.iter().map(|f| (number, chart.patch.faces[f.index()]));
+                    layout.broken.extend(faces);
+                    unmendable.uv
+                }
+            };
+            let label = i32::try_from(number).unwrap_or(i32::MAX);
+            for (local, &face) in chart.patch.mesh.faces().zip(&chart.patch.faces) {
+                layout.face_chart[face.index()] = label;
+                layout.polygon_chart[surface.polygon[face.index()] as usize] = label;
+                for (vertex, h) in chart.patch.mesh.triangle(local).iter().zip(face.halfedges()) {
+                    layout.uv[surface.corner[h.index()] as usize] = uv[vertex.index()];
+                }
+            }
+        }
+        Ok(layout)
+    }
+}
+
+fn pack(charts: &[Chart], settings: &Settings, progress: &Progress) -> Result<Packed, UnwrapError> {
+    let index = |v: crate::mesh::VertexId| u32::try_from(v.index()).unwrap_or(u32::MAX);
+    let triangles: Vec<Vec<[u32; 3]>> =
+        charts.iter().map(|c| c.patch.mesh.triangles().iter().map(|t| t.map(index)).collect()).collect();
+    let items: Vec<PackItem<'_>> =
+        charts.iter().zip(&triangles).map(|(c, t)| PackItem { points: &c.uv, triangles: t }).collect();
+    Ok(packing::pack(&items, &settings.packing, progress)?)
+}
+
+fn diagonal(surface: &Surface) -> f64 {
+    let mut low = Point3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY);
+    let mut high = -low;
+    for p in surface.mesh.positions() {
+        low = low.inf(p);
+        high = high.sup(p);
+    }
+    if surface.mesh.vertex_count() == 0 { 0.0 } else { (high - low).norm() }
+}
+
+/// Polygons with broken faces become charts of their own; charts that overlap after rounding are
+/// halved. What is left of a chart is flattened anew.
+fn mend(
+    surface: &Surface,
+    charts: Vec<Chart>,
+    faulty: &BTreeSet<usize>,
+    layout: &Layout,
+    rungs: &mut Rungs,
+    settings: &Settings,
+    progress: &Progress,
+) -> Result<Vec<Chart>, Cancelled> {
+    let mut separate: Vec<(usize, u32)> =
+        layout.broken.iter().map(|&(chart, face)| (chart, surface.polygon[face.index()])).collect();
+    separate.sort_unstable();
+    separate.dedup();
+    let mut kept = Vec::new();
+    let mut again = Vec::new();
+    for (number, chart) in charts.into_iter().enumerate() {
+        let broken: Vec<u32> = separate.iter().filter(|s| s.0 == number).map(|s| s.1).collect();
+        let patch = Patch::of_surface(&surface.mesh, &surface.polygon, sorted(&chart.patch.faces));
+        if patch.is_one_polygon() || (broken.is_empty() && !faulty.contains(&number)) {
+            kept.push(chart);
+        } else if broken.is_empty() {
+            rungs.take(Rung::Bisect);
+            let halves = segmentation::bisect(&patch.mesh, &patch.polygon);
+            again.extend(patch.split(&halves.label, halves.parts));
+        } else {
+            rungs.take(Rung::Separate);
+            let own = |p: &u32| broken.binary_search(p).map_or(0, |i| u32::try_from(i + 1).unwrap_or(u32::MAX));
+            let label: Vec<u32> = patch.polygon.iter().map(own).collect();
+            for part in patch.split(&label, broken.len() + 1).iter().filter(|p| !p.faces.is_empty()) {
+                let (component, count) = part.mesh.components();
+                again.extend(part.split(&component, count));
+            }
+        }
+    }
+    let redone = charting::chart(again, settings, progress)?;
+    rungs.add(&redone.rungs);
+    kept.extend(redone.charts);
+    kept.sort_by_key(|c| c.patch.faces.iter().min().copied());
+    Ok(kept)
+}
+
+fn sorted(faces: &[FaceId]) -> Vec<FaceId> {
+    let mut faces = faces.to_vec();
+    faces.sort_unstable();
+    faces
+}
+
+fn warnings(surface: &Surface, layout: &Layout, certificate: &Certificate) -> Vec<String> {
+    let mut list = surface.defects.warnings();
+    if layout.specks > 0 {
+        list.push(format!("{} charts smaller than a texel were enlarged to one", layout.specks));
+    }
+    if !certificate.is_valid() {
+        list.push(format!(
+            "the result could not be proven free of overlap: {} flipped triangles, {} crossings in charts, {} between \
+             charts; raise the texture size or lower the margin",
+            certificate.flipped.count, certificate.crossings_inside.count, certificate.crossings_between.count
+        ));
+    }
+    let area = measure::total_area(&surface.mesh);
+    if surface.mesh.face_count() > 0 && area <= 0.0 {
+        list.push("no face has an area".into());
+    }
+    list
+}

@@ -1,0 +1,191 @@
+//! One patch to one chart: the fallback ladder from a plane to Tutte.
+
+use std::f64::consts::TAU;
+
+use nalgebra::Point2;
+
+use crate::charts::{Chart, Patch};
+use crate::distortion::{self, RestTriangle};
+use crate::embedding::{self, EmbeddingError};
+use crate::geodesics::LandmarkDistances;
+use crate::progress::{Cancelled, Progress};
+use crate::settings::Settings;
+use crate::stretch::{self, Injective, MinimiseOptions, StretchError, TutteBoundary};
+
+use super::rungs::{Rung, Rungs};
+
+/// A chart is refused if one hundredth of its area is stretched by more than this: it would blur
+/// visibly there although its L2, an average, is fine.
+const MOST_P99_STRETCH: f64 = 4.0;
+
+/// A patch flattened without flips and without overlap.
+pub(super) struct Flat {
+    uv: Vec<Point2<f64>>,
+    l2: f64,
+}
+
+impl Flat {
+    pub(super) fn into_chart(self, patch: Patch) -> Chart {
+        Chart { patch, uv: self.uv, l2: self.l2 }
+    }
+}
+
+/// Isometric flattening of a planar or developable patch of genus 0 with a boundary; `None` where
+/// there is none without overlap.
+pub(super) fn isometric(patch: &Patch, rungs: &mut Rungs) -> Option<Flat> {
+    let mesh = &patch.mesh;
+    let rest = RestTriangle::of_mesh(mesh);
+    let (uv, rung) = match embedding::plane(mesh) {
+        Some(uv) => (uv, Rung::Plane),
+        None => (embedding::unfold(mesh, &rest)?, Rung::Unfold),
+    };
+    if stretch::first_flip(mesh, &uv).is_some() || !stretch::boundary_is_simple(mesh, &uv) {
+        return None;
+    }
+    rungs.take(rung);
+    Some(Flat { l2: stretch::l2_stretch(mesh, &rest, &uv), uv })
+}
+
+/// Flattens a patch of genus 0 with a boundary by embedding and stretch minimisation. `None` where the
+/// limit is out of reach: the work stops as soon as that is clear.
+pub(super) fn flatten(
+    patch: &Patch,
+    distances: &LandmarkDistances,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Progress,
+) -> Result<Option<Flat>, Cancelled> {
+    let trial = Trial { patch, rest: RestTriangle::of_mesh(&patch.mesh), settings, progress };
+    recover(trial.flatten(distances, Some(settings.stretch_limit), rungs))
+}
+
+/// Flattens a patch that is one polygon, which cannot be split: as well as it goes, and at worst on a
+/// circle, where every triangulation of a polygon is free of flips.
+pub(super) fn flatten_polygon(
+    patch: &Patch,
+    distances: &LandmarkDistances,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Progress,
+) -> Result<Flat, Cancelled> {
+    let trial = Trial { patch, rest: RestTriangle::of_mesh(&patch.mesh), settings, progress };
+    if let Some(flat) = recover(trial.flatten(distances, None, rungs))? {
+        return Ok(flat);
+    }
+    rungs.take(Rung::TutteCircle);
+    let loops = patch.mesh.boundary_loops();
+    let mut uv = vec![Point2::origin(); patch.mesh.vertex_count()];
+    for corners in loops.iter().take(1) {
+        for (i, h) in corners.iter().enumerate() {
+            let angle = TAU * i as f64 / corners.len() as f64;
+            uv[patch.mesh.from(*h).index()] = Point2::new(angle.cos(), angle.sin());
+        }
+    }
+    Ok(Flat { l2: stretch::l2_stretch(&patch.mesh, &trial.rest, &uv), uv })
+}
+
+struct Trial<'a> {
+    patch: &'a Patch,
+    rest: Vec<RestTriangle>,
+    settings: &'a Settings,
+    progress: &'a Progress,
+}
+
+impl Trial<'_> {
+    fn flatten(
+        &self,
+        distances: &LandmarkDistances,
+        limit: Option<f64>,
+        rungs: &mut Rungs,
+    ) -> Result<Option<Flat>, StretchError> {
+        let mesh = &self.patch.mesh;
+        if let Some(start) = self.embed(distances)? {
+            let (uv, how) = stretch::make_injective(mesh, &self.rest, &start, self.progress)?;
+            rungs.take(match how {
+                Injective::AlreadyWas => Rung::Embedding,
+                Injective::FoldoverFree => Rung::FoldoverFree,
+                Injective::TutteShape => Rung::TutteShape,
+                Injective::TutteCircle => Rung::TutteCircle,
+            });
+            let Some((uv, l2)) = self.minimise(&uv, limit, false)? else { return Ok(None) };
+            if stretch::boundary_is_simple(mesh, &uv) {
+                return Ok(self.judge(uv, l2, limit));
+            }
+            if limit.is_some_and(|limit| l2 > limit) {
+                return Ok(None);
+            }
+        }
+        // The free boundary ran over itself: start without overlap and keep it so.
+        let boundary = TutteBoundary::Circle;
+        let Some(circle) = stretch::tutte_embedding(mesh, &self.rest, boundary, self.progress)? else {
+            return Ok(None);
+        };
+        rungs.take(Rung::TutteCircle);
+        let Some((uv, l2)) = self.minimise(&circle, limit, true)? else { return Ok(None) };
+        Ok(if stretch::boundary_is_simple(mesh, &uv) { self.judge(uv, l2, limit) } else { None })
+    }
+
+    /// The paper's step: landmarks by likelihood, the rest by regression. `None` where the distances
+    /// do not span a plane; Tutte needs none.
+    fn embed(&self, distances: &LandmarkDistances) -> Result<Option<Vec<Point2<f64>>>, Cancelled> {
+        match embedding::embed_chart(distances, &self.settings.embedding, self.seed(), self.progress) {
+            Ok(embedded) => {
+                let mut uv = embedded.uv;
+                embedding::fix_gauge(&self.patch.mesh, &self.rest, &mut uv);
+                Ok(Some(uv))
+            }
+            Err(EmbeddingError::Cancelled(c)) => Err(c),
+            Err(_) => Ok(None),
+        }
+    }
+
+    /// `None` if it was given up.
+    fn minimise(
+        &self,
+        start: &[Point2<f64>],
+        abandon_above: Option<f64>,
+        keep_boundary_simple: bool,
+    ) -> Result<Option<(Vec<Point2<f64>>, f64)>, StretchError> {
+        let options = MinimiseOptions { abandon_above, keep_boundary_simple, seed: self.seed() };
+        let (mesh, settings) = (&self.patch.mesh, &self.settings.stretch);
+        let best = stretch::minimise_stretch(mesh, &self.rest, start, settings, &options, self.progress)?;
+        Ok((!best.abandoned).then_some((best.uv, best.l2)))
+    }
+
+    fn judge(&self, uv: Vec<Point2<f64>>, l2: f64, limit: Option<f64>) -> Option<Flat> {
+        let good = limit.is_none_or(|limit| l2 <= limit && self.p99_stretch(&uv) <= MOST_P99_STRETCH);
+        good.then_some(Flat { uv, l2 })
+    }
+
+    /// The stretch that 99 % of the area stays under, with the chart at the area of its surface.
+    fn p99_stretch(&self, uv: &[Point2<f64>]) -> f64 {
+        let mesh = &self.patch.mesh;
+        let squared = |f: crate::mesh::FaceId| {
+            let corners = mesh.triangle(f).map(|v| uv[v.index()]);
+            distortion::squared_stretch(&self.rest[f.index()].jacobian(corners))
+        };
+        let mut faces: Vec<(f64, f64)> = mesh.faces().map(|f| (squared(f), self.rest[f.index()].area())).collect();
+        faces.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let total: f64 = faces.iter().map(|f| f.1).sum();
+        let mut below = 0.0;
+        let p99 = faces.iter().find(|f| {
+            below += f.1;
+            below >= 0.99 * total
+        });
+        p99.map_or(1.0, |f| (f.0 * stretch::plane_area(mesh, uv) / total).sqrt())
+    }
+
+    /// The same for a patch whatever else the surface holds.
+    fn seed(&self) -> u64 {
+        self.settings.seed ^ self.patch.faces.first().map_or(0, |f| f.index() as u64)
+    }
+}
+
+/// A patch that defeats a solver or has no injective map is refused like one that is too stretched.
+fn recover(result: Result<Option<Flat>, StretchError>) -> Result<Option<Flat>, Cancelled> {
+    match result {
+        Ok(flat) => Ok(flat),
+        Err(StretchError::Cancelled(c)) => Err(c),
+        Err(_) => Ok(None),
+    }
+}

@@ -1,0 +1,145 @@
+//! Charts joined to larger ones where the union still flattens under the limit.
+//!
+//! Splitting top-down is greedy: two neighbours from different branches may well be one chart. Iso-charts
+//! merges by an estimate; here the real flattening is the judge.
+
+use rayon::prelude::*;
+
+use crate::charts::{Chart, Patch};
+use crate::mesh::{FaceId, HalfedgeId, TriMesh};
+use crate::progress::{Cancelled, Progress};
+use crate::settings::Settings;
+
+use super::charting;
+use super::rungs::{Rung, Rungs};
+
+/// Failed unions a chart may take part in before it is left alone.
+const MOST_FAILURES: usize = 4;
+
+/// A chart and its history.
+struct Candidate {
+    chart: Chart,
+    area: f64,
+    failures: usize,
+    /// Charts (by index) whose union with this one is known to be over the limit.
+    refused: Vec<usize>,
+}
+
+/// Joins neighbouring charts, longest shared border over √(smaller area) first, as long as the union
+/// is under the limit. Each chart takes part in at most four failed tests, so the number of tests is
+/// linear in the number of charts. `family[i]` names the split that chart `i` came out of, if its
+/// other half is whole, too: their union has already been refused.
+pub(super) fn merge(
+    mesh: &TriMesh,
+    polygon: &[u32],
+    charts: Vec<Chart>,
+    family: &[Option<u32>],
+    settings: &Settings,
+    progress: &Progress,
+) -> Result<(Vec<Chart>, Rungs), Cancelled> {
+    let mut rungs = Rungs::default();
+    let mut pool: Vec<Option<Candidate>> = charts
+        .into_iter()
+        .map(|chart| Some(Candidate { area: chart.patch.area(), chart, failures: 0, refused: Vec::new() }))
+        .collect();
+    for a in 0..pool.len() {
+        let Some(split) = family[a] else { continue };
+        let others = (0..family.len()).filter(|&b| b != a && family[b] == Some(split)).collect();
+        if let Some(c) = &mut pool[a] {
+            c.refused = others;
+        }
+    }
+    let mut owner = vec![usize::MAX; mesh.face_count()];
+    for (i, c) in pool.iter().enumerate() {
+        for f in c.iter().flat_map(|c| &c.chart.patch.faces) {
+            owner[f.index()] = i;
+        }
+    }
+    loop {
+        progress.check()?;
+        let pairs = independent_pairs(&pool, &borders(mesh, &owner, &pool));
+        if pairs.is_empty() {
+            break;
+        }
+        let tests: Vec<Result<(Option<Chart>, Rungs), Cancelled>> = pairs
+            .par_iter()
+            .with_max_len(1)
+            .map(|&(a, b)| {
+                let mut rungs = Rungs::default();
+                let union = union(mesh, polygon, &pool, a, b);
+                Ok((charting::try_chart(&union, settings, &mut rungs, progress)?, rungs))
+            })
+            .collect();
+        for (&(a, b), test) in pairs.iter().zip(tests) {
+            let (joined, steps) = test?;
+            if let Some(chart) = joined {
+                rungs.add(&steps);
+                rungs.take(Rung::Merge);
+                for f in &chart.patch.faces {
+                    owner[f.index()] = pool.len();
+                }
+                pool[a] = None;
+                pool[b] = None;
+                pool.push(Some(Candidate { area: chart.patch.area(), chart, failures: 0, refused: Vec::new() }));
+            } else {
+                for (one, other) in [(a, b), (b, a)] {
+                    if let Some(c) = &mut pool[one] {
+                        c.failures += 1;
+                        c.refused.push(other);
+                    }
+                }
+            }
+        }
+    }
+    let mut charts: Vec<Chart> = pool.into_iter().flatten().map(|c| c.chart).collect();
+    charts.sort_by_key(|c| c.patch.faces.iter().min().copied());
+    Ok((charts, rungs))
+}
+
+fn union(mesh: &TriMesh, polygon: &[u32], pool: &[Option<Candidate>], a: usize, b: usize) -> Patch {
+    let faces_of = |i: usize| pool[i].iter().flat_map(|c| c.chart.patch.faces.iter().copied());
+    let mut faces: Vec<FaceId> = faces_of(a).chain(faces_of(b)).collect();
+    faces.sort_unstable();
+    Patch::of_surface(mesh, polygon, faces)
+}
+
+/// Shared border length of each pair of charts that may still be tested, sorted by pair.
+fn borders(mesh: &TriMesh, owner: &[usize], pool: &[Option<Candidate>]) -> Vec<(usize, usize, f64)> {
+    let open = |i: usize| pool[i].as_ref().is_some_and(|c| c.failures < MOST_FAILURES);
+    let shared = |h: HalfedgeId| {
+        let t = mesh.twin(h);
+        if t.is_none() || t < h {
+            return None;
+        }
+        let (a, b) = (owner[h.face().index()], owner[t.face().index()]);
+        let (a, b) = (a.min(b), a.max(b));
+        let refused = || pool[a].as_ref().is_some_and(|c| c.refused.contains(&b));
+        (a != b && b != usize::MAX && open(a) && open(b) && !refused()).then(|| (a, b, mesh.edge_length(h)))
+    };
+    let mut sides: Vec<(usize, usize, f64)> = mesh.halfedges().filter_map(shared).collect();
+    sides.sort_by_key(|s| (s.0, s.1));
+    sides
+        .chunk_by(|x, y| (x.0, x.1) == (y.0, y.1))
+        .map(|group| (group[0].0, group[0].1, group.iter().map(|s| s.2).sum()))
+        .collect()
+}
+
+/// Pairs in which no chart occurs twice, best first.
+fn independent_pairs(pool: &[Option<Candidate>], borders: &[(usize, usize, f64)]) -> Vec<(usize, usize)> {
+    let area = |i: usize| pool[i].as_ref().map_or(0.0, |c| c.area);
+    let mut scored: Vec<(f64, usize, usize)> = borders
+        .iter()
+        .map(|&(a, b, length)| (length / area(a).min(area(b)).max(f64::MIN_POSITIVE).sqrt(), a, b))
+        .collect();
+    scored.sort_by(|x, y| y.0.total_cmp(&x.0).then((x.1, x.2).cmp(&(y.1, y.2))));
+    let mut taken = vec![false; pool.len()];
+    let mut pairs = Vec::new();
+    for (_, a, b) in scored {
+        if !taken[a] && !taken[b] {
+            taken[a] = true;
+            taken[b] = true;
+            pairs.push((a, b));
+        }
+    }
+    pairs
+}

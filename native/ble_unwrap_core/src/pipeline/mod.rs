@@ -1,0 +1,90 @@
+//! The whole way from a mesh to an atlas; alone knows every stage.
+//!
+//! 1. Condition the input into an oriented manifold surface ([`mesh::condition`]).
+//! 2. Cut it into charts under the stretch limit, and join charts that were cut needlessly.
+//! 3. Pack the charts and round to single precision.
+//! 4. Verify the rounded result exactly and measure it.
+
+mod charting;
+mod finish;
+mod flatten;
+mod merge;
+mod rungs;
+
+use std::time::Instant;
+
+use crate::charts::Patch;
+use crate::error::UnwrapError;
+use crate::mesh::{self, ConditionOptions, MeshInput};
+use crate::progress::{Progress, Stage};
+use crate::report::Report;
+use crate::settings::Settings;
+
+pub use rungs::{Rung, Rungs};
+
+/// A UV for every corner of the input, and what is known about it.
+#[derive(Clone, Debug)]
+pub struct Atlas {
+    /// One UV a corner, in [0, 1]²; (0, 0) for the corners of unmapped faces.
+    pub uv: Vec<[f32; 2]>,
+    /// Chart of each input face, from 0; −1 for unmapped faces.
+    pub chart: Vec<i32>,
+    /// Measures of the result.
+    pub report: Report,
+}
+
+/// Unwraps a mesh: cuts it into charts, flattens them under the stretch limit, packs them.
+///
+/// Guaranteed for every result, and checked exactly on the final single-precision values: each face
+/// whose vertices are finite lies in exactly one chart; no triangle is flipped or without area; no
+/// chart overlaps itself or another; charts keep the margin. Every chart has an L2 stretch within
+/// `settings.stretch_limit` or is listed in the report (a single polygon may not flatten under it). The result is the same,
+/// bit for bit, for any number of threads.
+///
+/// Not guaranteed: the fewest charts or the shortest seams possible.
+///
+/// Near-linear in the number of faces. Runs on rayon's current thread pool.
+///
+/// # Errors
+/// [`UnwrapError`]: invalid arrays, a setting out of range, charts that cannot keep the margin at the
+/// texture size, or cancelled. Nothing is produced then.
+pub fn unwrap(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -> Result<Atlas, UnwrapError> {
+    progress.check()?;
+    settings.validate()?;
+    let mut clock = Clock::new();
+    progress.enter(Stage::Condition);
+    let surface = mesh::condition(input, &ConditionOptions { weld: settings.weld }, progress)?;
+    clock.lap("condition");
+
+    progress.enter(Stage::Charts);
+    let patches = Patch::components(&surface.mesh, &surface.polygon);
+    let charting = charting::chart(patches, settings, progress)?;
+    clock.lap("charts");
+    let (mut charts, mut rungs) = (charting.charts, charting.rungs);
+    if settings.merge {
+        let (merged, steps) =
+            merge::merge(&surface.mesh, &surface.polygon, charts, &charting.family, settings, progress)?;
+        charts = merged;
+        rungs.add(&steps);
+        clock.lap("merge");
+    }
+    finish::finish(input, &surface, charts, rungs, settings, clock, progress)
+}
+
+/// Seconds of each stage, for the report; nothing is decided by them.
+struct Clock {
+    last: Instant,
+    laps: Vec<(&'static str, f64)>,
+}
+
+impl Clock {
+    fn new() -> Self {
+        Self { last: Instant::now(), laps: Vec::new() }
+    }
+
+    fn lap(&mut self, name: &'static str) {
+        let now = Instant::now();
+        self.laps.push((name, (now - self.last).as_secs_f64()));
+        self.last = now;
+    }
+}

@@ -1,0 +1,90 @@
+//! The fallback ladder of a chart, and how often each rung was taken.
+
+/// How a chart, or the decision to split it, came about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Rung {
+    /// Coplanar faces, projected.
+    Plane,
+    /// A developable piece, unfolded isometrically.
+    Unfold,
+    /// Bernoulli logistic embedding, no flip to clear.
+    Embedding,
+    /// The embedding, its flips cleared by the foldover-free energy.
+    FoldoverFree,
+    /// Tutte's embedding in the convexified outline of the embedding.
+    TutteShape,
+    /// Tutte's embedding in a circle.
+    TutteCircle,
+    /// A surface with handles, or a closed one, was cut open along short loops.
+    CutOpen,
+    /// Holes were joined by a cut, or a dart led to the worst point.
+    Dart,
+    /// Split by spectral segmentation.
+    Split,
+    /// Split in half by breadth-first order.
+    Bisect,
+    /// Faces that rounding to single precision would have flipped became charts of their own.
+    Separate,
+    /// Two charts joined to one.
+    Merge,
+}
+
+impl Rung {
+    const ALL: [Self; 12] = [
+        Self::Plane,
+        Self::Unfold,
+        Self::Embedding,
+        Self::FoldoverFree,
+        Self::TutteShape,
+        Self::TutteCircle,
+        Self::CutOpen,
+        Self::Dart,
+        Self::Split,
+        Self::Bisect,
+        Self::Separate,
+        Self::Merge,
+    ];
+
+    /// A short name for reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Plane => "plane",
+            Self::Unfold => "unfold",
+            Self::Embedding => "embedding",
+            Self::FoldoverFree => "foldover_free",
+            Self::TutteShape => "tutte_shape",
+            Self::TutteCircle => "tutte_circle",
+            Self::CutOpen => "cut_open",
+            Self::Dart => "dart",
+            Self::Split => "split",
+            Self::Bisect => "bisect",
+            Self::Separate => "separate",
+            Self::Merge => "merge",
+        }
+    }
+}
+
+/// Counts of rungs.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Rungs([usize; Rung::ALL.len()]);
+
+impl Rungs {
+    /// Counts one more.
+    pub fn take(&mut self, rung: Rung) {
+        self.0[rung as usize] += 1;
+    }
+
+    /// Adds the counts of another.
+    pub fn add(&mut self, other: &Self) {
+        for (a, b) in self.0.iter_mut().zip(other.0) {
+            *a += b;
+        }
+    }
+
+    /// Names and counts of the rungs taken at least once, in the order of the ladder.
+    #[must_use]
+    pub fn taken(&self) -> Vec<(&'static str, usize)> {
+        Rung::ALL.iter().map(|&r| (r.name(), self.0[r as usize])).filter(|&(_, n)| n > 0).collect()
+    }
+}

@@ -1,0 +1,315 @@
+//! Double-precision UVs of a chart rounded to float32 without turning a triangle over.
+//!
+//! Near 1 the float32 grid has a pitch of 6e-8. A needle or a very small triangle may collapse on it
+//! or change its orientation. Then vertices of the triangle are moved, one by one, by a few grid
+//! steps: each to where the least height in its star is greatest (a linear program in two variables,
+//! `kernel`), as far as the grid lets it. Boundary vertices stay within a 64th of a texel.
+
+mod kernel;
+
+use nalgebra::{Point2, Vector2};
+use robust::{Coord, orient2d};
+use thiserror::Error;
+
+use crate::mesh::{FaceId, TriMesh, VertexId};
+
+use kernel::{Constraint, best_point};
+
+/// A triangle thinner than this (height over its longest edge, in UV) is degenerate to float32
+/// readers, which take 1e-7 of the layout's extent as the bound. Three times that leaves room.
+const HEIGHT: f64 = 3e-7;
+/// Surface triangles thinner than this share of the bounding box diagonal are degenerate anyway, and
+/// only have to keep their orientation.
+const DEGENERATE: f64 = 1e-7;
+/// Boundary vertices move at most this share of a texel: invisible, and a sixteenth of what a margin
+/// is accurate to.
+const BOUNDARY_REACH: f64 = 1.0 / 64.0;
+/// Inner vertices move at most this share of a texel.
+const INNER_REACH: f64 = 0.5;
+/// Rounds; the reach doubles every second one, from two grid steps to 8192.
+const ROUNDS: u32 = 24;
+/// Rounds in which triangles that are merely thin are looked after: up to eight grid steps, more
+/// than `HEIGHT` asks for.
+const THIN_ROUNDS: u32 = 6;
+/// From this round on the neighbours of a turned triangle's vertices move as well.
+const NEIGHBOUR_ROUND: u32 = 8;
+/// Moves tried at most, for turned and for thin triangles each. About 10 µs a try.
+const TRIES: usize = 50_000;
+
+/// What the rounding has to know besides the chart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rounding {
+    /// Size of a texel along u and v.
+    pub texel: [f64; 2],
+    /// Bounding box diagonal of the whole input mesh, in the unit of the chart's positions.
+    pub diagonal: f64,
+}
+
+/// A rounded chart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rounded {
+    /// UV of each vertex.
+    pub uv: Vec<[f32; 2]>,
+    /// Vertices that are not at the float32 point nearest to where they were.
+    pub moved: usize,
+    /// Triangles, not degenerate on the surface, that stay thinner than 3e-7 in UV.
+    pub thin_faces: usize,
+}
+
+/// Triangles without a positive area in float32.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error("{} triangles lose their orientation in float32, first {}", .faces.len(), .faces[0])]
+pub struct Unmendable {
+    /// The triangles, ascending; at least one.
+    pub faces: Vec<FaceId>,
+    /// The best that was found.
+    pub uv: Vec<[f32; 2]>,
+}
+
+/// Rounds the final UVs of a chart, one for each vertex of `mesh`, to float32 in [0, 1].
+///
+/// Guaranteed: every triangle of the result is strictly positive by an exact test; vertices whose
+/// triangles survive plain rounding are rounded plainly; the result depends on the arguments alone.
+/// Not guaranteed: that moved boundary vertices leave the boundary simple (they move less than a 64th
+/// of a texel; [`verify`](crate::verify()) tells).
+///
+/// O(n) and one pass where nothing breaks; a bounded number of moves otherwise.
+///
+/// # Errors
+/// [`Unmendable`]: the chart is too small for the float32 grid, or `uv` had turned triangles (or NaN).
+///
+/// # Panics
+/// If `uv` does not hold one point a vertex.
+pub fn round_to_f32(mesh: &TriMesh, uv: &[Point2<f64>], rounding: &Rounding) -> Result<Rounded, Unmendable> {
+    assert_eq!(uv.len(), mesh.vertex_count(), "one UV a vertex");
+    // Adding 0 makes −0 plain.
+    let plain: Vec<[f32; 2]> = uv.iter().map(|p| [p.x as f32 + 0.0, p.y as f32 + 0.0]).collect();
+    let mut mender =
+        Mender { mesh, home: uv, uv: plain.clone(), rounding, goal: Vec::new(), turned: Vec::new(), thin: Vec::new() };
+    mender.goal = mesh.faces().map(|f| mender.surface_goal(f)).collect();
+    mender.look(mesh.faces());
+    mender.mend();
+    let moved = mender.uv.iter().zip(&plain).filter(|(a, b)| a != b && !(a[0].is_nan() || a[1].is_nan())).count();
+    if mender.turned.is_empty() {
+        Ok(Rounded { uv: mender.uv, moved, thin_faces: mender.thin.len() })
+    } else {
+        Err(Unmendable { faces: mender.turned, uv: mender.uv })
+    }
+}
+
+struct Mender<'a> {
+    mesh: &'a TriMesh,
+    home: &'a [Point2<f64>],
+    uv: Vec<[f32; 2]>,
+    rounding: &'a Rounding,
+    /// Height each face should have.
+    goal: Vec<f32>,
+    /// Faces not strictly positive, ascending.
+    turned: Vec<FaceId>,
+    /// Positive faces below their goal, ascending.
+    thin: Vec<FaceId>,
+}
+
+impl Mender<'_> {
+    /// The height a face should have in UV: 0 if it has none on the surface.
+    fn surface_goal(&self, f: FaceId) -> f32 {
+        let p = self.mesh.triangle_positions(f);
+        let (e1, e2) = (p[1] - p[0], p[2] - p[0]);
+        let longest = e1.norm().max(e2.norm()).max((p[2] - p[1]).norm());
+        if e1.cross(&e2).norm() > DEGENERATE * self.rounding.diagonal * longest { HEIGHT as f32 } else { 0.0 }
+    }
+
+    fn at(&self, v: VertexId) -> [f32; 2] {
+        self.uv[v.index()]
+    }
+
+    /// Sorts the given faces, ascending, into turned, thin and good ones.
+    fn look(&mut self, faces: impl Iterator<Item = FaceId>) {
+        let (mut turned, mut thin) = (Vec::new(), Vec::new());
+        for f in faces {
+            let [a, b, c] = self.mesh.triangle(f).map(|v| self.at(v));
+            let area = double_area(a, b, c);
+            if !is_positive(area) {
+                turned.push(f);
+            } else if area < f64::from(self.goal[f.index()]) * longest_edge(a, b, c) {
+                thin.push(f);
+            }
+        }
+        self.turned = turned;
+        self.thin = thin;
+    }
+
+    fn mend(&mut self) {
+        let largest = self.uv.iter().flatten().fold(0.0f32, |a, x| a.max(x.abs()));
+        // At least the pitch of the grid at the largest coordinate.
+        let pitch = f64::from(largest) * f64::from(f32::EPSILON);
+        let mut tries = [TRIES; 2];
+        for round in 0..ROUNDS {
+            let thin_too = round < THIN_ROUNDS && !self.thin.is_empty() && tries[1] > 0;
+            if self.turned.is_empty() && !thin_too {
+                return;
+            }
+            let reach = pitch * f64::from(2u32 << (round / 2));
+            let mut touched: Vec<FaceId> = self.turned.iter().chain(&self.thin).copied().collect();
+            let lists = [self.turned.clone(), if thin_too { self.thin.clone() } else { Vec::new() }];
+            for (list, tries) in lists.iter().zip(&mut tries) {
+                for v in self.vertices_of(list, round >= NEIGHBOUR_ROUND) {
+                    if *tries == 0 {
+                        break;
+                    }
+                    *tries -= 1;
+                    if self.improve(v, reach) {
+                        touched.extend(self.mesh.outgoing(v).map(|h| h.face()));
+                    }
+                }
+            }
+            touched.sort_unstable();
+            touched.dedup();
+            self.look(touched.into_iter());
+        }
+    }
+
+    /// Vertices of faces, each once, in the order of the faces; inner ones of a face first. With their
+    /// neighbours behind them if asked.
+    fn vertices_of(&self, faces: &[FaceId], neighbours: bool) -> Vec<VertexId> {
+        let mut order = Vec::with_capacity(3 * faces.len());
+        for &f in faces {
+            let mut corners = self.mesh.triangle(f);
+            corners.sort_unstable_by_key(|&v| (self.mesh.is_boundary_vertex(v), v));
+            order.extend(corners);
+        }
+        if neighbours {
+            for i in 0..order.len() {
+                order.extend(self.mesh.neighbours(order[i]));
+            }
+        }
+        let mut seen = std::collections::HashSet::new();
+        order.retain(|&v| seen.insert(v));
+        order
+    }
+
+    /// Moves a vertex to the best point within `reach` of where it belongs, if that is better than
+    /// where it is.
+    fn improve(&mut self, v: VertexId, reach: f64) -> bool {
+        let home = self.home[v.index()];
+        let share = if self.mesh.is_boundary_vertex(v) { BOUNDARY_REACH } else { INNER_REACH };
+        let reach = self.rounding.texel.map(|t| reach.min(share * t));
+        if !(home.x.is_finite() && home.y.is_finite()) {
+            return false;
+        }
+        // What may be moved to, relative to home: within reach and the unit square.
+        let lo = [0, 1].map(|k| (-reach[k]).max(-home[k]).min(0.0));
+        let hi = [0, 1].map(|k| reach[k].min(1.0 - home[k]).max(0.0));
+        let local = |p: [f32; 2]| Vector2::new(f64::from(p[0]) - home.x, f64::from(p[1]) - home.y);
+        let star: Vec<Opposite> = self
+            .mesh
+            .outgoing(v)
+            .map(|h| {
+                let (p, q) = (self.at(self.mesh.to(h)), self.at(self.mesh.from(h.prev())));
+                let (a, b) = (local(p), local(q));
+                let d = b - a;
+                let gradient = Vector2::new(-d.y, d.x);
+                let constant = a.perp(&b);
+                let most =
+                    constant + [0, 1].map(|k| (gradient[k] * lo[k]).max(gradient[k] * hi[k])).iter().sum::<f64>();
+                // No more than half of what this vertex alone can reach, or a face that others must
+                // mend would hide the rest.
+                let goal = f64::from(self.goal[h.face().index()]).max(0.25 * f64::from(f32::EPSILON));
+                let want = (goal * a.norm().max(b.norm()).max(d.norm())).min(0.5 * most);
+                Opposite { p, q, constraint: Constraint { gradient, constant, want } }
+            })
+            .collect();
+        let constraints: Vec<Constraint> = star.iter().map(|o| o.constraint).filter(|c| c.want > 0.0).collect();
+        let Some(best) = best_point(&constraints, lo, hi) else { return false };
+        let target = [(home.x + best.x) as f32 + 0.0, (home.y + best.y) as f32 + 0.0];
+        let current = self.score(&star, self.at(v), home);
+        let (mut winner, mut winning) = (self.at(v), current);
+        for dx in [0, -1, 1] {
+            for dy in [0, -1, 1] {
+                let p = [step(target[0], dx), step(target[1], dy)];
+                let inside = (0..2).all(|k| (f64::from(p[k]) - home[k]).abs() <= share * self.rounding.texel[k]);
+                let score = self.score(&star, p, home);
+                if inside && score.beats(&winning) {
+                    (winner, winning) = (p, score);
+                }
+            }
+        }
+        let better = winning.turned < current.turned || winning.least > current.least + 1e-3 * current.least.abs();
+        if better {
+            self.uv[v.index()] = winner;
+        }
+        better
+    }
+
+    fn score(&self, star: &[Opposite], x: [f32; 2], home: Point2<f64>) -> Score {
+        let mut score = Score { turned: 0, least: 1.0, distance: 0.0 };
+        for o in star {
+            let area = double_area(x, o.p, o.q);
+            score.turned += usize::from(!is_positive(area));
+            if o.constraint.want > 0.0 {
+                score.least = score.least.min(area / o.constraint.want);
+            }
+        }
+        score.distance = (f64::from(x[0]) - home.x).hypot(f64::from(x[1]) - home.y);
+        score
+    }
+}
+
+/// The edge of a face opposite to the vertex that moves.
+struct Opposite {
+    p: [f32; 2],
+    q: [f32; 2],
+    constraint: Constraint,
+}
+
+/// How good a place for a vertex is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Score {
+    /// Faces of its star that are not strictly positive.
+    turned: usize,
+    /// The least share of what each face wants; at most 1.
+    least: f64,
+    /// Distance from where the vertex belongs.
+    distance: f64,
+}
+
+impl Score {
+    fn beats(&self, other: &Self) -> bool {
+        if self.turned != other.turned {
+            return self.turned < other.turned;
+        }
+        self.least > other.least || (self.least == other.least && self.distance < other.distance)
+    }
+}
+
+/// A float32 neighbour of a coordinate that stays in [0, 1].
+fn step(x: f32, by: i32) -> f32 {
+    match by {
+        -1 => x.next_down(),
+        1 => x.next_up(),
+        _ => x,
+    }
+    .clamp(0.0, 1.0)
+}
+
+/// Twice the signed area; its sign is exact.
+fn double_area(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> f64 {
+    let coord = |p: [f32; 2]| Coord { x: f64::from(p[0]), y: f64::from(p[1]) };
+    orient2d(coord(a), coord(b), coord(c))
+}
+
+/// Whether an area makes a triangle; NaN does not.
+fn is_positive(area: f64) -> bool {
+    area > 0.0
+}
+
+fn longest_edge(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> f64 {
+    let length = |p: [f32; 2], q: [f32; 2]| {
+        let d = [0, 1].map(|k| f64::from(q[k]) - f64::from(p[k]));
+        d[0] * d[0] + d[1] * d[1]
+    };
+    length(a, b).max(length(b, c)).max(length(c, a)).sqrt()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,206 @@
+//! Borders between parts as minimum cuts in a band.
+//!
+//! Iso-charts, section 4.3 (after Katz and Tal 2003): of all curves in a band around the border that
+//! growth found, take the one that is short, follows creases, and lies where both sides' embeddings
+//! fit equally badly.
+
+use crate::geodesics::LandmarkDistances;
+use crate::linalg::{Mds, classical_mds};
+use crate::mesh::{TriMesh, measure};
+use crate::progress::{Cancelled, Progress};
+
+use super::CutGraph;
+use super::polygon_graph::PolygonGraph;
+
+/// Capacities are integers, so that the cut does not depend on the order of sums; a side of mean
+/// length and mean cost gets this many units.
+const UNIT: f64 = 65536.0;
+
+/// Moves the borders between parts. `crease_weight` is the α of the capacity
+/// α/(1 + d/mean) + (1 − α)·(gᵢ + gⱼ)/(2·mean), with d = 1 − cos(dihedral) and g the difference between
+/// the errors of a polygon's distances in the two parts' own embeddings.
+pub(super) fn improve(
+    mesh: &TriMesh,
+    graph: &PolygonGraph,
+    distances: &LandmarkDistances,
+    representatives: &[usize],
+    band: f64,
+    crease_weight: f64,
+    label: &mut [u32],
+    progress: &Progress,
+) -> Result<(), Cancelled> {
+    let bends = Bends::new(mesh, graph);
+    let parts: Vec<Part> = (0..representatives.len())
+        .map(|r| Part::new(mesh, graph, distances, representatives, r, crease_weight < 1.0))
+        .collect();
+    for a in 0..parts.len() {
+        for b in a + 1..parts.len() {
+            progress.check()?;
+            let pair = Pair { mesh, graph, distances, bends: &bends, number: [a, b], parts: [&parts[a], &parts[b]] };
+            pair.improve(band, crease_weight, label, progress)?;
+        }
+    }
+    Ok(())
+}
+
+/// One part as its representative sees it.
+struct Part {
+    /// Mean distance of each polygon to the representative.
+    reach: Vec<f64>,
+    /// Landmarks nearer to this representative than to any other.
+    landmarks: Vec<usize>,
+    /// Their classical scaling, if it is wanted and can be had.
+    embedding: Option<Mds>,
+}
+
+impl Part {
+    fn new(
+        mesh: &TriMesh,
+        graph: &PolygonGraph,
+        distances: &LandmarkDistances,
+        representatives: &[usize],
+        number: usize,
+        embed: bool,
+    ) -> Self {
+        let row = distances.row(representatives[number]);
+        let reach = (0..graph.len()).map(|p| graph.mean_at(mesh, p, |v| f64::from(row[v]))).collect();
+        let nearest = |l: usize| {
+            let to = |r: usize| distances.get(representatives[r], distances.landmarks()[l]);
+            (0..representatives.len()).min_by(|&a, &b| to(a).total_cmp(&to(b)).then(a.cmp(&b)))
+        };
+        let landmarks: Vec<usize> = (0..distances.len()).filter(|&l| nearest(l) == Some(number)).collect();
+        let embedding = if embed {
+            let all = distances.between_landmarks();
+            let pairs = landmarks.iter().flat_map(|&i| landmarks.iter().map(move |&j| (i, j)));
+            let squared: Vec<f64> = pairs.map(|(i, j)| all[i * distances.len() + j].powi(2)).collect();
+            classical_mds(&squared, landmarks.len(), 2).ok()
+        } else {
+            None
+        };
+        Self { reach, landmarks, embedding }
+    }
+
+    /// Mean squared error of the distances of a polygon to the landmarks of this part, in its
+    /// embedding; 0 without one.
+    fn error(&self, pair: &Pair<'_>, polygon: usize) -> f64 {
+        let Some(mds) = &self.embedding else { return 0.0 };
+        let distance = |l: &usize| {
+            let row = pair.distances.row(*l);
+            pair.graph.mean_at(pair.mesh, polygon, |v| f64::from(row[v]))
+        };
+        let d: Vec<f64> = self.landmarks.iter().map(distance).collect();
+        let squared: Vec<f64> = d.iter().map(|d| d * d).collect();
+        let mut at = [0.0; 2];
+        mds.place(&squared, &mut at);
+        let error = |(i, d): (usize, &f64)| {
+            let to: f64 = mds.point(i).iter().zip(at).map(|(a, b)| (a - b) * (a - b)).sum();
+            (to.sqrt() - d).powi(2)
+        };
+        d.iter().enumerate().map(error).sum::<f64>() / d.len().max(1) as f64
+    }
+}
+
+/// 1 − cos(dihedral) of each side, in the order of the graph's links.
+struct Bends {
+    first: Vec<usize>,
+    bend: Vec<f64>,
+    mean_bend: f64,
+    mean_length: f64,
+}
+
+impl Bends {
+    fn new(mesh: &TriMesh, graph: &PolygonGraph) -> Self {
+        let normals = measure::face_normals(mesh);
+        let mut first = Vec::with_capacity(graph.len());
+        let mut bend = Vec::new();
+        let (mut sum_bend, mut sum_length) = (0.0, 0.0);
+        for links in graph.links.iter() {
+            first.push(bend.len());
+            for link in links {
+                let (f, g) = (link.halfedge.face(), mesh.twin(link.halfedge).face());
+                let d = (1.0 - normals[f.index()].dot(&normals[g.index()])).clamp(0.0, 2.0);
+                sum_bend += d * link.length;
+                sum_length += link.length;
+                bend.push(d);
+            }
+        }
+        let mean = |sum: f64, n: f64| if n > 0.0 { sum / n } else { 0.0 };
+        Self { first, mean_bend: mean(sum_bend, sum_length), mean_length: mean(sum_length, bend.len() as f64), bend }
+    }
+}
+
+/// Two parts and the border between them.
+struct Pair<'a> {
+    mesh: &'a TriMesh,
+    graph: &'a PolygonGraph,
+    distances: &'a LandmarkDistances,
+    bends: &'a Bends,
+    number: [usize; 2],
+    parts: [&'a Part; 2],
+}
+
+impl Pair<'_> {
+    fn improve(
+        &self,
+        band: f64,
+        crease_weight: f64,
+        label: &mut [u32],
+        progress: &Progress,
+    ) -> Result<(), Cancelled> {
+        let [a, b] = self.number.map(|n| u32::try_from(n).unwrap_or(0));
+        // −1 at the first representative, 0 on the bisector, 1 at the second.
+        let balance = |p: usize| {
+            let (to_a, to_b) = (self.parts[0].reach[p], self.parts[1].reach[p]);
+            let sum = to_a + to_b;
+            if sum > 0.0 && sum.is_finite() { (to_a - to_b) / sum } else { 0.0 }
+        };
+        let movable = |p: usize| (label[p] == a || label[p] == b) && balance(p).abs() < band;
+        let nodes: Vec<usize> = (0..self.graph.len()).filter(|&p| movable(p)).collect();
+        let beyond = |p: usize| if label[p] == a { b } else { a };
+        let touches = |p: usize| self.graph.links.group(p).iter().any(|l| label[l.to as usize] == beyond(p));
+        if !nodes.iter().any(|&p| touches(p)) {
+            return Ok(());
+        }
+        let mut node = vec![usize::MAX; self.graph.len()];
+        for (i, &p) in nodes.iter().enumerate() {
+            node[p] = i;
+        }
+        let misfit: Vec<f64> = if crease_weight < 1.0 {
+            nodes.iter().map(|&p| (self.parts[0].error(self, p) - self.parts[1].error(self, p)).abs()).collect()
+        } else {
+            vec![0.0; nodes.len()]
+        };
+        let mean_misfit = (misfit.iter().sum::<f64>() / nodes.len() as f64).max(f64::MIN_POSITIVE);
+        let mean_bend = self.bends.mean_bend.max(f64::MIN_POSITIVE);
+        let mean_length = self.bends.mean_length.max(f64::MIN_POSITIVE);
+        let mut cut = CutGraph::new(nodes.len());
+        for (i, &p) in nodes.iter().enumerate() {
+            for (k, link) in self.graph.links.group(p).iter().enumerate() {
+                let q = link.to as usize;
+                let crease = 1.0 / (1.0 + self.bends.bend[self.bends.first[p] + k] / mean_bend);
+                let other = if node[q] == usize::MAX { misfit[i] } else { misfit[node[q]] };
+                let fit = (misfit[i] + other) / (2.0 * mean_misfit);
+                let cost = crease_weight * crease + (1.0 - crease_weight) * fit;
+                let capacity = capacity(cost * link.length / mean_length);
+                if node[q] != usize::MAX {
+                    if p < q {
+                        cut.add_edge(i, node[q], capacity);
+                    }
+                } else if label[q] == a {
+                    cut.add_terminals(i, capacity, 0);
+                } else if label[q] == b {
+                    cut.add_terminals(i, 0, capacity);
+                }
+            }
+        }
+        for (&p, on_side_of_a) in nodes.iter().zip(cut.min_cut(progress)?) {
+            label[p] = if on_side_of_a { a } else { b };
+        }
+        Ok(())
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the range of capacities")]
+fn capacity(relative: f64) -> u64 {
+    (relative * UNIT).clamp(1.0, 1e12) as u64
+}

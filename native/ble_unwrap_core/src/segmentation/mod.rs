@@ -1,0 +1,104 @@
+//! Cutting a patch into parts that flatten better.
+//!
+//! Zhou, Snyder, Guo, Shum: Iso-charts: stretch-driven mesh parameterization using spectral
+//! analysis, SGP 2004, sections 3 and 4; the paper takes its segmentation from there (section 5.1).
+//!
+//! 1. [`SpectralAnalysis`]: classical scaling of the landmark distances tells how many dimensions
+//!    the patch needs, and how well two would do.
+//! 2. Representatives: landmarks at the ends of the leading dimensions, spread apart.
+//! 3. Growth: every polygon goes to the nearest representative by geodesic distance.
+//! 4. Boundaries: a minimum cut in a band around each border, drawn to creases and to short lines.
+//! 5. Repair: parts become connected, fragments go to a neighbour.
+//!
+//! Polygons stay whole. The result is a label a face; each label is connected over polygon sides.
+
+mod boundary;
+mod grow;
+mod min_cut;
+mod polygon_graph;
+mod repair;
+mod spectral;
+
+use crate::geodesics::LandmarkDistances;
+use crate::mesh::TriMesh;
+use crate::progress::{Cancelled, Progress};
+
+pub use min_cut::CutGraph;
+use polygon_graph::PolygonGraph;
+pub use spectral::SpectralAnalysis;
+
+/// Parameters of the segmentation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SegmentationSettings {
+    /// Most parts of the first split of a component (iso-charts: 10).
+    pub first_parts: usize,
+    /// Most parts of every later split.
+    pub later_parts: usize,
+    /// Width of the band that the minimum cut may move a border in: |d₁ − d₂| / (d₁ + d₂) for the
+    /// distances to the two representatives.
+    pub band: f64,
+    /// Share of the dihedral angle in the cut's cost, 0 to 1; the rest looks at embedding errors.
+    pub crease_weight: f64,
+}
+
+impl Default for SegmentationSettings {
+    fn default() -> Self {
+        Self { first_parts: 2, later_parts: 2, band: 0.3, crease_weight: 0.65 }
+    }
+}
+
+/// The parts of a patch.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Segmentation {
+    /// Part of each face; each part is connected.
+    pub label: Vec<u32>,
+    /// Number of parts.
+    pub parts: usize,
+}
+
+/// Splits a patch by spectral analysis into at least two connected parts of whole polygons.
+///
+/// `polygon` names the polygon of each face. `first` says whether this is the first split of a
+/// component. If the spectral split comes out as one part, the polygons are halved in breadth-first
+/// order, so the result has two parts or more whenever the patch has two polygons. O(n log n) and
+/// one minimum cut a border.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn segment(
+    mesh: &TriMesh,
+    polygon: &[u32],
+    distances: &LandmarkDistances,
+    analysis: &SpectralAnalysis,
+    first: bool,
+    settings: &SegmentationSettings,
+    progress: &Progress,
+) -> Result<Segmentation, Cancelled> {
+    let graph = PolygonGraph::new(mesh, polygon);
+    let most = if first { settings.first_parts } else { settings.later_parts };
+    let area: f64 = graph.area.iter().sum();
+    let representatives = grow::representatives(distances, analysis, area, most.min(2 * analysis.dimension));
+    let mut label = grow::nearest(mesh, &graph, distances, &representatives);
+    let crease_weight = if first { 1.0 } else { settings.crease_weight };
+    boundary::improve(mesh, &graph, distances, &representatives, settings.band, crease_weight, &mut label, progress)?;
+    Ok(finish(&graph, label))
+}
+
+/// Halves a patch in breadth-first order of its polygons: the split that always works, for patches
+/// that spectral analysis cannot split. O(n).
+#[must_use]
+pub fn bisect(mesh: &TriMesh, polygon: &[u32]) -> Segmentation {
+    let graph = PolygonGraph::new(mesh, polygon);
+    let label = grow::halves(&graph);
+    finish(&graph, label)
+}
+
+fn finish(graph: &PolygonGraph, mut label: Vec<u32>) -> Segmentation {
+    repair::absorb_fragments(graph, &mut label);
+    let mut parts = graph.split_components(&mut label);
+    if parts < 2 {
+        label = grow::halves(graph);
+        parts = graph.split_components(&mut label);
+    }
+    Segmentation { label: graph.of_face.iter().map(|&p| label[p as usize]).collect(), parts }
+}

@@ -1,0 +1,11 @@
+//! Single steps of the pipeline on plain arrays, for hosts that want no more than that.
+//!
+//! Everything is numbered as in the input, whatever conditioning does to it on the way.
+
+mod distances;
+mod layout;
+mod repack;
+
+pub use distances::{DistancesError, surface_distances};
+pub use layout::{LayoutError, LayoutMeasures, measure_layout};
+pub use repack::{RepackError, Repacked, repack};

@@ -1,0 +1,108 @@
+//! Clears flipped triangles from a map with a free boundary.
+//!
+//! Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov: Foldover-free maps in 50 lines of code, ACM TOG
+//! 2021. The energy and the schedule of ε are theirs.
+
+use nalgebra::Point2;
+
+use super::StretchError;
+use super::energy::FoldoverEnergy;
+use super::overlap::first_flip;
+use super::system::{ChartSystem, advance};
+use crate::distortion::RestTriangle;
+use crate::mesh::TriMesh;
+use crate::progress::Progress;
+
+/// Newton steps at most.
+const MAX_ITERATIONS: usize = 120;
+/// Armijo's constant.
+const ARMIJO: f64 = 1e-4;
+/// Halvings before a step is given up.
+const MAX_HALVINGS: usize = 30;
+/// Least share of its way to zero that ε goes in an iteration (σ in the paper).
+const LEAST_PROGRESS: f64 = 0.1;
+
+/// Moves all vertices until every triangle is positive; `Ok(None)` if that did not succeed within
+/// a fixed number of steps. `start` must be finite and in about surface units.
+pub(super) fn foldover_free(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    start: &[Point2<f64>],
+    progress: &Progress,
+) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
+    let mut system = ChartSystem::new(mesh, rest)?;
+    let mut uv = start.to_vec();
+    let mut trial = uv.clone();
+    let mut direction = vec![0.0; 2 * uv.len()];
+    let mut energy = FoldoverEnergy { epsilon: 1.0 };
+    for _ in 0..MAX_ITERATIONS {
+        if first_flip(mesh, &uv).is_none() {
+            return Ok(Some(uv));
+        }
+        progress.check()?;
+        let before = system.value(&energy, &uv);
+        system.assemble(&energy, &uv);
+        let Some(slope) = system.solve(&mut direction) else { break };
+        let mut step = 1.0;
+        let mut after = before;
+        for _ in 0..MAX_HALVINGS {
+            advance(&uv, &direction, step, &mut trial);
+            let value = system.value(&energy, &trial);
+            if value <= before + ARMIJO * step * slope {
+                std::mem::swap(&mut uv, &mut trial);
+                after = value;
+                break;
+            }
+            step *= 0.5;
+        }
+        // Equation 7 of the paper.
+        let sigma = (1.0 - after / before).max(LEAST_PROGRESS);
+        let least = system.least_determinant(&uv);
+        let root = least.hypot(energy.epsilon);
+        energy.epsilon *= if least >= 0.0 { 1.0 - sigma } else { 1.0 - sigma * root / (least.abs() + root) };
+    }
+    Ok(first_flip(mesh, &uv).is_none().then_some(uv))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stretch::test_meshes::{annulus, grid, hemisphere};
+    use nalgebra::Point3;
+
+    fn clears(mesh: &TriMesh, start: &[Point2<f64>]) {
+        let rest = RestTriangle::of_mesh(mesh);
+        assert!(first_flip(mesh, start).is_some(), "nothing to clear");
+        let uv = foldover_free(mesh, &rest, start, &Progress::new()).expect("solver").expect("cleared");
+        assert_eq!(first_flip(mesh, &uv), None);
+    }
+
+    #[test]
+    fn a_folded_sheet_and_a_mirrored_one() {
+        let mesh = grid(12, 8, |x, y| Point3::new(x, y, 0.0));
+        let folded: Vec<_> = mesh.positions().iter().map(|p| Point2::new((p.x - 5.3).abs(), p.y + 0.05 * p.x)).collect();
+        clears(&mesh, &folded);
+        let mirrored: Vec<_> = mesh.positions().iter().map(|p| Point2::new(-p.x, p.y)).collect();
+        clears(&mesh, &mirrored);
+        let scattered: Vec<_> = (0..mesh.vertex_count()).map(|i| Point2::new((i * 7 % 13) as f64, (i * 5 % 11) as f64)).collect();
+        clears(&mesh, &scattered);
+    }
+
+    #[test]
+    fn a_projected_ball_and_a_ring() {
+        // More than a hemisphere, seen from above.
+        let mesh = hemisphere(14);
+        let wrapped: Vec<_> = mesh
+            .positions()
+            .iter()
+            .map(|p| {
+                let a = 1.6 * p.z.clamp(-1.0, 1.0).acos();
+                Point2::from(p.xy().coords.try_normalize(1e-12).unwrap_or_default() * a.sin())
+            })
+            .collect();
+        clears(&mesh, &wrapped);
+        let ring = annulus(40, 5);
+        let inverted: Vec<_> = ring.positions().iter().map(|p| p.xy() / p.coords.norm_squared()).collect();
+        clears(&ring, &inverted);
+    }
+}

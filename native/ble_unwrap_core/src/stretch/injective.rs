@@ -1,0 +1,131 @@
+//! From any start to a map without flips.
+
+use nalgebra::Point2;
+
+use super::StretchError;
+use super::foldover_free::foldover_free;
+use super::measure::{plane_area, rescale_to_equal_area};
+use super::overlap::first_flip;
+use super::tutte::{TutteBoundary, tutte_attempt};
+use crate::distortion::RestTriangle;
+use crate::mesh::TriMesh;
+use crate::progress::Progress;
+
+/// How a map came to have no flips; each rung of the ladder is tried only if those before it failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Injective {
+    /// The start had none (or was all mirrored).
+    AlreadyWas,
+    /// A regularised energy cleared them.
+    FoldoverFree,
+    /// Tutte's embedding in the convexified outline of the start.
+    TutteShape,
+    /// Tutte's embedding in a circle.
+    TutteCircle,
+}
+
+/// A map near `start` (a point a vertex, in about surface units) with all triangles strictly positive by an exact test, and how
+/// it was got.
+///
+/// Not guaranteed: that the boundary does not overlap itself, except after Tutte; see
+/// [`boundary_is_simple`](super::boundary_is_simple). Always ends; at worst some hundred sparse factorisations.
+///
+/// # Errors
+/// [`StretchError::DoubledEdge`] where no such map exists, [`StretchError::NotInjective`] where rounding
+/// defeated every rung (a tentacle a billion times deeper than its mouth), the others as named.
+///
+/// # Panics
+/// If there is not one rest triangle a face and one point a vertex.
+pub fn make_injective(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    start: &[Point2<f64>],
+    progress: &Progress,
+) -> Result<(Vec<Point2<f64>>, Injective), StretchError> {
+    assert_eq!((rest.len(), start.len()), (mesh.face_count(), mesh.vertex_count()), "a rest triangle a face, a point a vertex");
+    progress.check()?;
+    if first_flip(mesh, start).is_none() {
+        return Ok((start.to_vec(), Injective::AlreadyWas));
+    }
+    let finite = start.iter().all(|p| p.x.is_finite() && p.y.is_finite());
+    let mut start = start.to_vec();
+    if finite {
+        if plane_area(mesh, &start) < 0.0 {
+            start.iter_mut().for_each(|p| p.x = -p.x);
+            if first_flip(mesh, &start).is_none() {
+                return Ok((start, Injective::AlreadyWas));
+            }
+        }
+        if let Some(uv) = foldover_free(mesh, rest, &start, progress)? {
+            return Ok((uv, Injective::FoldoverFree));
+        }
+    }
+    let rungs = [
+        (TutteBoundary::Shape(&start), Injective::TutteShape),
+        (TutteBoundary::Circle, Injective::TutteCircle),
+    ];
+    for (boundary, rung) in rungs {
+        let Some(mut uv) = tutte_attempt(mesh, rest, boundary, progress)? else { continue };
+        if first_flip(mesh, &uv).is_none() {
+            return Ok((uv, rung));
+        }
+        // Rounding flipped a few of the smallest triangles: a case for the regularised energy.
+        rescale_to_equal_area(mesh, rest, &mut uv);
+        if uv.iter().all(|p| p.x.is_finite() && p.y.is_finite())
+            && let Some(uv) = foldover_free(mesh, rest, &uv, progress)?
+        {
+            return Ok((uv, rung));
+        }
+    }
+    Err(StretchError::NotInjective)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stretch::test_meshes::{annulus, grid, hemisphere};
+    use nalgebra::Point3;
+
+    #[test]
+    fn takes_the_first_rung_that_holds() {
+        let mesh = grid(6, 6, |x, y| Point3::new(x, y, 0.0));
+        let rest = RestTriangle::of_mesh(&mesh);
+        let go = |uv: &[Point2<f64>]| make_injective(&mesh, &rest, uv, &Progress::new()).expect("injective");
+        let flat: Vec<_> = mesh.positions().iter().map(|p| p.xy()).collect();
+        assert_eq!(go(&flat), (flat.clone(), Injective::AlreadyWas));
+        let mirrored: Vec<_> = flat.iter().map(|p| Point2::new(-p.x, p.y)).collect();
+        assert_eq!(go(&mirrored).1, Injective::AlreadyWas);
+        let folded: Vec<_> = flat.iter().map(|p| Point2::new((p.x - 2.0).abs(), p.y)).collect();
+        assert_eq!(go(&folded).1, Injective::FoldoverFree);
+        let nothing = vec![Point2::new(f64::NAN, 0.0); flat.len()];
+        assert_eq!(go(&nothing).1, Injective::TutteCircle);
+    }
+
+    #[test]
+    fn any_start_ends_without_flips() {
+        for mesh in [hemisphere(8), annulus(17, 3), grid(30, 1, |x, y| Point3::new(x, y, 0.0))] {
+            let rest = RestTriangle::of_mesh(&mesh);
+            let n = mesh.vertex_count();
+            let starts = [
+                vec![Point2::origin(); n],
+                (0..n).map(|i| Point2::new(i as f64, 0.0)).collect(),
+                (0..n).map(|i| Point2::new((i * 7919 % 101) as f64 * 1e6, (i * 104_729 % 97) as f64 * 1e-6)).collect(),
+                vec![Point2::new(f64::INFINITY, 1.0); n],
+            ];
+            for start in &starts {
+                let (uv, _) = make_injective(&mesh, &rest, start, &Progress::new()).expect("injective");
+                assert_eq!(first_flip(&mesh, &uv), None);
+            }
+        }
+    }
+
+    #[test]
+    fn stops_when_cancelled() {
+        let mesh = hemisphere(4);
+        let progress = Progress::new();
+        progress.cancel();
+        let start = vec![Point2::origin(); mesh.vertex_count()];
+        let result = make_injective(&mesh, &RestTriangle::of_mesh(&mesh), &start, &progress);
+        assert!(matches!(result, Err(StretchError::Cancelled(_))));
+    }
+}

@@ -1,0 +1,242 @@
+//! The sum of an energy over the triangles of a chart: value, gradient, and Newton's linear system.
+
+use nalgebra::{Matrix2, Point2, Vector2};
+
+use super::energy::{HatGradients, IsotropicEnergy, StretchEnergy, face_derivatives};
+use crate::distortion::RestTriangle;
+use crate::linalg::{SparseCholesky, SparseError, SparsePattern};
+use crate::mesh::{HalfedgeId, TriMesh};
+
+/// Relative weight added to each diagonal entry of the Hessian, which is singular for translations
+/// and rotations. Far below any mode that matters, far above rounding (1e-16 times the row count).
+const RIDGE: f64 = 1e-9;
+/// Each time a pivot fails the ridge grows by this factor ...
+const RIDGE_GROWTH: f64 = 100.0;
+/// ... at most so often, up to a thousandfold diagonal: plain gradient descent.
+const RIDGE_ATTEMPTS: usize = 7;
+
+/// A chart's triangles with everything that does not change between Newton steps: hat gradients,
+/// area weights (summing to one), the place of every block in the sparse matrix, the analysed factor.
+pub(super) struct ChartSystem {
+    triangles: Vec<[u32; 3]>,
+    hats: Vec<HatGradients>,
+    weights: Vec<f64>,
+    /// For each half-edge, where the block of its two ends begins.
+    across: Vec<[u32; 3]>,
+    /// For each vertex, where its diagonal block begins.
+    diagonal: Vec<u32>,
+    /// For each vertex, how far its second column lies behind its first.
+    stride: Vec<u32>,
+    /// Where the scalar diagonal entries are, and what was assembled there before the ridge.
+    diagonal_entries: Vec<u32>,
+    base_diagonal: Vec<f64>,
+    solver: SparseCholesky,
+    hessian: Vec<f64>,
+    gradient: Vec<f64>,
+}
+
+/// Sums over a chart with areas as weights, ΣA₃ = 1.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StretchSums {
+    /// Σ A₃ e, e the squared stretch of a face.
+    pub(super) stretch: f64,
+    /// Σ A₂.
+    pub(super) area: f64,
+}
+
+impl StretchSums {
+    /// L2 stretch at the chart's own best scale.
+    pub(super) fn l2(self) -> f64 {
+        (self.stretch * self.area).sqrt()
+    }
+}
+
+impl ChartSystem {
+    /// Analyses the Hessian's pattern. O(n log n), a third of a factorisation.
+    pub(super) fn new(mesh: &TriMesh, rest: &[RestTriangle]) -> Result<Self, SparseError> {
+        let total: f64 = rest.iter().map(RestTriangle::area).sum();
+        let triangles: Vec<[u32; 3]> = mesh.triangles().iter().map(|t| t.map(|v| v.index() as u32)).collect();
+        let pairs = triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+        let vertices = SparsePattern::from_pairs(mesh.vertex_count(), pairs);
+        let pattern = vertices.with_blocks_of_two();
+        let place = |i: u32, j: u32| {
+            pattern.position(2 * i.min(j) as usize, 2 * i.max(j) as usize).map_or(u32::MAX, |p| p as u32)
+        };
+        let across = triangles.iter().map(|&[a, b, c]| [place(a, b), place(b, c), place(c, a)]).collect();
+        let diagonal: Vec<u32> = (0..mesh.vertex_count() as u32).map(|v| place(v, v)).collect();
+        let stride: Vec<u32> = (0..mesh.vertex_count()).map(|v| pattern.column(2 * v).len() as u32).collect();
+        Ok(Self {
+            hats: rest.iter().map(HatGradients::new).collect(),
+            weights: rest.iter().map(|r| r.area() / total).collect(),
+            across,
+            diagonal_entries: diagonal.iter().zip(&stride).flat_map(|(&d, &s)| [d, d + s + 1]).collect(),
+            base_diagonal: vec![0.0; 2 * mesh.vertex_count()],
+            diagonal,
+            stride,
+            hessian: vec![0.0; pattern.entry_count()],
+            gradient: vec![0.0; 2 * mesh.vertex_count()],
+            triangles,
+            solver: SparseCholesky::analyse(pattern)?,
+        })
+    }
+
+    #[inline]
+    fn jacobian(&self, face: usize, uv: &[Point2<f64>]) -> Matrix2<f64> {
+        let [p, q, r] = self.triangles[face].map(|v| uv[v as usize]);
+        self.hats[face].jacobian(q - p, r - p)
+    }
+
+    /// Sum of the energy, with areas as weights.
+    pub(super) fn value<E: IsotropicEnergy>(&self, energy: &E, uv: &[Point2<f64>]) -> f64 {
+        let mut sum = 0.0;
+        for face in 0..self.triangles.len() {
+            let j = self.jacobian(face, uv);
+            sum += self.weights[face] * energy.value(j.norm_squared(), j.determinant());
+        }
+        sum
+    }
+
+    /// The sums that make up the L2 stretch; faces of no area make them infinite.
+    pub(super) fn stretch_sums(&self, uv: &[Point2<f64>]) -> StretchSums {
+        let mut sums = StretchSums { stretch: 0.0, area: 0.0 };
+        for face in 0..self.triangles.len() {
+            let j = self.jacobian(face, uv);
+            let d = j.determinant();
+            sums.stretch += self.weights[face] * 0.5 * j.norm_squared() / (d * d);
+            sums.area += self.weights[face] * d;
+        }
+        sums
+    }
+
+    /// Least determinant of a Jacobian.
+    pub(super) fn least_determinant(&self, uv: &[Point2<f64>]) -> f64 {
+        (0..self.triangles.len()).map(|f| self.jacobian(f, uv).determinant()).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The factor by which to scale `uv` to make the energy least: (Q/P)^¼ for P t² + Q/t².
+    pub(super) fn best_scale(&self, energy: &StretchEnergy, uv: &[Point2<f64>]) -> f64 {
+        let (mut growing, mut falling) = (0.0, 0.0);
+        for face in 0..self.triangles.len() {
+            let j = self.jacobian(face, uv);
+            let (i, d) = (j.norm_squared(), j.determinant());
+            growing += self.weights[face] * energy.growing(i, d);
+            falling += self.weights[face] * 0.25 * i / (d * d);
+        }
+        (falling / growing).sqrt().sqrt()
+    }
+
+    /// Gradient and projected Hessian of the energy at `uv`. O(faces).
+    pub(super) fn assemble<E: IsotropicEnergy>(&mut self, energy: &E, uv: &[Point2<f64>]) {
+        self.hessian.fill(0.0);
+        self.gradient.fill(0.0);
+        for face in 0..self.triangles.len() {
+            let d = face_derivatives(energy, &self.hats[face], &self.jacobian(face, uv));
+            let (t, w) = (self.triangles[face], self.weights[face]);
+            for k in 0..3 {
+                self.add_gradient(t[k], d.gradient[k] * w);
+                self.add_diagonal(t[k], &(d.diagonal[k] * w));
+                self.add_across(face, k, &(d.across[k] * w));
+            }
+        }
+    }
+
+    /// Adds to the gradient at a vertex.
+    #[inline]
+    pub(super) fn add_gradient(&mut self, vertex: u32, g: Vector2<f64>) {
+        self.gradient[2 * vertex as usize] += g.x;
+        self.gradient[2 * vertex as usize + 1] += g.y;
+    }
+
+    /// Adds a symmetric block to the diagonal of the Hessian.
+    #[inline]
+    pub(super) fn add_diagonal(&mut self, vertex: u32, m: &Matrix2<f64>) {
+        let (at, stride) = (self.diagonal[vertex as usize] as usize, self.stride[vertex as usize] as usize);
+        self.hessian[at] += m.m11;
+        self.hessian[at + stride] += m.m12;
+        self.hessian[at + stride + 1] += m.m22;
+    }
+
+    /// Adds the block whose rows belong to the start and whose columns belong to the end of a half-edge.
+    #[inline]
+    fn add_across(&mut self, face: usize, slot: usize, m: &Matrix2<f64>) {
+        let (from, to) = (self.triangles[face][slot], self.triangles[face][(slot + 1) % 3]);
+        let (at, stride) = (self.across[face][slot] as usize, self.stride[from.max(to) as usize] as usize);
+        let (m12, m21) = if from < to { (m.m12, m.m21) } else { (m.m21, m.m12) };
+        self.hessian[at] += m.m11;
+        self.hessian[at + 1] += m21;
+        self.hessian[at + stride] += m12;
+        self.hessian[at + stride + 1] += m.m22;
+    }
+
+    /// Adds the block of a half-edge's two ends; rows belong to its start.
+    pub(super) fn add_edge_block(&mut self, h: HalfedgeId, m: &Matrix2<f64>) {
+        self.add_across(h.face().index(), h.slot(), m);
+    }
+
+    /// The assembled gradient, x and y of each vertex in turn.
+    pub(super) fn gradient(&self) -> &[f64] {
+        &self.gradient
+    }
+
+    /// Newton's direction for what was assembled, into `direction`; returns the slope along it,
+    /// negative, or `None` where no descent direction came out (at a minimum up to rounding).
+    pub(super) fn solve(&mut self, direction: &mut [f64]) -> Option<f64> {
+        // Where all eigenvalues round a vertex are clamped its entries vanish, so the ridge is
+        // measured by the mean entry too.
+        let mut mean = 0.0;
+        for (base, &at) in self.base_diagonal.iter_mut().zip(&self.diagonal_entries) {
+            *base = self.hessian[at as usize];
+            mean += *base;
+        }
+        mean /= self.base_diagonal.len().max(1) as f64;
+        let mut ridge = RIDGE;
+        for _ in 0..RIDGE_ATTEMPTS {
+            for (base, &at) in self.base_diagonal.iter().zip(&self.diagonal_entries) {
+                self.hessian[at as usize] = base + ridge * (base + mean);
+            }
+            if self.solver.refactor(&self.hessian).is_ok() {
+                for (d, g) in direction.iter_mut().zip(&self.gradient) {
+                    *d = -g;
+                }
+                self.solver.solve_in_place(direction);
+                let slope: f64 = direction.iter().zip(&self.gradient).map(|(d, g)| d * g).sum();
+                if slope < 0.0 && slope.is_finite() {
+                    return Some(slope);
+                }
+                if slope == 0.0 {
+                    return None;
+                }
+            }
+            ridge *= RIDGE_GROWTH;
+        }
+        None
+    }
+
+    /// The greatest step along `direction` at which no triangle has collapsed yet; infinite if none
+    /// ever does. `uv` must have positive triangles.
+    pub(super) fn first_flip(&self, uv: &[Point2<f64>], direction: &[f64]) -> f64 {
+        let mut least = f64::INFINITY;
+        for t in &self.triangles {
+            let [p, q, r] = t.map(|v| uv[v as usize]);
+            let [dp, dq, dr] = t.map(|v| Vector2::new(direction[2 * v as usize], direction[2 * v as usize + 1]));
+            let (e, f, de, df) = (q - p, r - p, dq - dp, dr - dp);
+            let (c, b, a) = (e.perp(&f), e.perp(&df) + de.perp(&f), de.perp(&df));
+            // Smallest positive root of a t² + b t + c, c > 0, in the form that does not cancel.
+            let discriminant = b * b - 4.0 * a * c;
+            if discriminant >= 0.0 {
+                let denominator = discriminant.sqrt() - b;
+                if denominator > 0.0 {
+                    least = least.min(2.0 * c / denominator);
+                }
+            }
+        }
+        least
+    }
+}
+
+/// `uv + step · direction` into `out`.
+pub(super) fn advance(uv: &[Point2<f64>], direction: &[f64], step: f64, out: &mut [Point2<f64>]) {
+    for ((o, p), d) in out.iter_mut().zip(uv).zip(direction.chunks_exact(2)) {
+        *o = Point2::new(p.x + step * d[0], p.y + step * d[1]);
+    }
+}

@@ -1,0 +1,218 @@
+//! Exact checks of the final float32 layout.
+//!
+//! # What is checked, and why it proves a layout injective
+//!
+//! All signs come from exact predicates (Shewchuk: Adaptive precision floating-point arithmetic and
+//! fast robust geometric predicates, 1997), so there is no tolerance anywhere. For each chart:
+//!
+//! 1. every triangle is strictly positive;
+//! 2. the *boundary chain* (the directed edges of its triangles, less those that two triangles run
+//!    through in opposite directions) consists of simple loops that do not touch themselves or
+//!    each other;
+//! 3. exactly one of these loops is positively oriented.
+//!
+//! Because of 1 the number of triangles over a point of the plane is the degree of the layout there,
+//! which is the winding number of the boundary chain around the point. Because of 2 every loop
+//! contributes 0 and +1 (a positive one) or −1; because of 3 the sum is at most 1. So no two
+//! triangles share area. Nothing is asked of the inside: a vertex around which the surface winds twice
+//! has all its triangles positive, but then some boundary must wind twice, and 2 or 3 fails. Nor is
+//! anything asked of the surface: vertices count as one where their UVs are one.
+//!
+//! For the layout, further:
+//!
+//! 4. boundary loops of different charts do not touch;
+//! 5. no loop lies in the filled area of another chart (in its holes it may).
+//!
+//! Two charts that share area without their boundaries meeting would have a loop of one inside the
+//! filled area of the other. So 1 to 5 make the whole layout injective.
+
+mod boundary;
+mod crossings;
+mod nesting;
+
+use robust::{Coord, orient2d};
+
+use crate::metrics::{GAP_SEARCH_TEXELS, NONE, OwnedSegment, UvMesh, least_gap};
+use crate::progress::{Cancelled, Progress};
+
+use boundary::{Boundary, Vertices};
+
+/// How many elements break a rule, and the first of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Defect<T> {
+    /// Number of offenders.
+    pub count: usize,
+    /// The lowest offender (see [`Certificate::complete`]).
+    pub first: Option<T>,
+}
+
+impl<T> Default for Defect<T> {
+    fn default() -> Self {
+        Self { count: 0, first: None }
+    }
+}
+
+impl<T: Copy + Ord> Defect<T> {
+    fn add(&mut self, offender: T) {
+        self.merge(Self { count: 1, first: Some(offender) });
+    }
+
+    fn merge(&mut self, other: Self) {
+        self.count += other.count;
+        self.first = match (self.first, other.first) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        };
+    }
+}
+
+/// The outcome of the exact checks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Certificate {
+    /// Charts: different non-negative labels.
+    pub charts: usize,
+    /// Triangles with a negative label. They are part of no other check and no fault by themselves.
+    pub unmapped: Defect<u32>,
+    /// Triangles with a corner outside the unit square, or not finite.
+    pub out_of_range: Defect<u32>,
+    /// Triangles not strictly positive: turned over or without area.
+    pub flipped: Defect<u32>,
+    /// Pairs of boundary edges of one chart that cross or touch, other than by following each other;
+    /// named by their triangles, lower first. Also a vertex that a boundary visits twice.
+    pub crossings_inside: Defect<(u32, u32)>,
+    /// Pairs of boundary edges of different charts that have a point in common.
+    pub crossings_between: Defect<(u32, u32)>,
+    /// Boundary loops inside the filled area of another chart: a triangle at the loop, and the lowest
+    /// triangle of that chart.
+    pub nested: Defect<(u32, u32)>,
+    /// Charts (labels) that do not have exactly one positively oriented boundary loop: in pieces, or
+    /// turned inside out.
+    pub bad_loops: Defect<i32>,
+    /// Labels of all charts that break a rule, ascending.
+    pub faulty_charts: Vec<i32>,
+    /// Least distance between boundaries of different charts in texels, not exact but to rounding;
+    /// the search limit (eight texels, or twice the margin) if it is more.
+    pub gap_texels: f64,
+    /// False if a bound of work ended a search. Then there are so many contacts that counts are lower
+    /// bounds and the first offender need not be the lowest, or nothing is proven.
+    pub complete: bool,
+}
+
+impl Certificate {
+    /// Whether the layout is proven to be injective and in the unit square.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        self.complete
+            && self.out_of_range.count == 0
+            && self.flipped.count == 0
+            && self.crossings_inside.count == 0
+            && self.crossings_between.count == 0
+            && self.nested.count == 0
+            && self.bad_loops.count == 0
+    }
+}
+
+/// Checks a layout exactly; the module's text tells what is proven.
+///
+/// Charts are the labels of `mesh`. `reversed` is true for triangles that the library turned against
+/// the input's winding, empty if it turned none. A false [`Certificate::complete`] needs tens of
+/// millions of near misses or contacts.
+///
+/// Deterministic for any number of threads. O(n log n); less than a second for a million triangles.
+///
+/// # Errors
+/// [`Cancelled`].
+///
+/// # Panics
+/// If `reversed` is neither empty nor as long as the triangles.
+pub fn verify(mesh: &UvMesh, reversed: &[bool], progress: &Progress) -> Result<Certificate, Cancelled> {
+    let m = mesh.triangle_count();
+    assert!(reversed.is_empty() || reversed.len() == m, "one orientation a triangle");
+    let mut out = Certificate { complete: true, ..Certificate::default() };
+    let mut labels: Vec<i32> = (0..m).map(|f| mesh.label(f)).filter(|&l| l >= 0).collect();
+    labels.sort_unstable();
+    labels.dedup();
+    out.charts = labels.len();
+    let mut faulty = vec![false; labels.len()];
+
+    // The triangles with a chart and finite UVs, turned as the library has them.
+    let mut corners: Vec<[Point; 3]> = Vec::with_capacity(m);
+    let mut source: Vec<u32> = Vec::with_capacity(m);
+    let mut chart: Vec<u32> = Vec::with_capacity(m);
+    for f in 0..m {
+        let Some(uv) = mesh.corner_uv(f) else {
+            out.unmapped.add(f as u32);
+            continue;
+        };
+        let c = labels.partition_point(|&l| l < mesh.label(f));
+        let inside = |x: &f32| (0.0..=1.0).contains(x);
+        if !uv.iter().flatten().all(inside) {
+            out.out_of_range.add(f as u32);
+            faulty[c] = true;
+        }
+        let turned = reversed.get(f).copied().unwrap_or(false);
+        let uv = if turned { [uv[0], uv[2], uv[1]] } else { uv };
+        let finite = uv.iter().flatten().all(|x| x.is_finite());
+        if !finite || orientation(uv[0], uv[1], uv[2]) <= 0 {
+            out.flipped.add(f as u32);
+            faulty[c] = true;
+        }
+        if finite {
+            corners.push(uv);
+            source.push(f as u32);
+            chart.push(c as u32);
+        }
+    }
+    progress.check()?;
+
+    let vertices = Vertices::new(&corners, &chart);
+    let boundary = Boundary::new(&vertices, &chart, &source, labels.len());
+    progress.check()?;
+    for &(a, b, c) in &boundary.pinches {
+        out.crossings_inside.add((a.min(b), a.max(b)));
+        faulty[c as usize] = true;
+    }
+    for (c, &positive) in boundary.positive_loops.iter().enumerate() {
+        if positive != 1 {
+            out.bad_loops.add(labels[c]);
+            faulty[c] = true;
+        }
+    }
+    let contacts = crossings::contacts(&boundary.edges, progress)?;
+    out.crossings_inside.merge(contacts.inside);
+    out.crossings_between.merge(contacts.between);
+    out.complete &= contacts.complete;
+    let nests = nesting::nested(&boundary, progress)?;
+    out.nested = nests.nested;
+    out.complete &= nests.complete;
+    for c in contacts.charts.into_iter().chain(nests.charts) {
+        faulty[c as usize] = true;
+    }
+    out.faulty_charts = labels.iter().zip(&faulty).filter(|(_, f)| **f).map(|(&l, _)| l).collect();
+
+    let texels = mesh.texture().texels();
+    let segments: Vec<OwnedSegment> = boundary
+        .edges
+        .iter()
+        .map(|e| OwnedSegment { ends: e.ends.map(|p| [0, 1].map(|k| f64::from(p[k]) * texels[k])), owner: e.chart })
+        .collect();
+    let limit = GAP_SEARCH_TEXELS.max(2.0 * mesh.texture().margin);
+    let (gap, complete) = least_gap(&segments, limit, progress)?;
+    out.gap_texels = gap;
+    out.complete &= complete;
+    debug_assert!(boundary.edges.iter().all(|e| e.chart != NONE));
+    Ok(out)
+}
+
+/// A UV, finite.
+type Point = [f32; 2];
+
+/// Sign of the area of triangle abc: 1 counter-clockwise, 0 collinear, −1 clockwise. Exact.
+pub(crate) fn orientation(a: Point, b: Point, c: Point) -> i8 {
+    let coord = |p: Point| Coord { x: f64::from(p[0]), y: f64::from(p[1]) };
+    let area = orient2d(coord(a), coord(b), coord(c));
+    i8::from(area > 0.0) - i8::from(area < 0.0)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,180 @@
+"""Automatic UV unwrapping under a stretch bound, by Bernoulli logistic embedding."""
+
+from collections.abc import Buffer
+from typing import Any, Literal, TypedDict, Unpack, final, type_check_only
+
+__all__ = [
+    "Array",
+    "Atlas",
+    "BleUnwrapError",
+    "Cancelled",
+    "Embedding",
+    "InternalError",
+    "InvalidArgumentError",
+    "InvalidMeshError",
+    "Job",
+    "PackedCharts",
+    "__version__",
+    "default_settings",
+    "embed",
+    "geodesic_distances",
+    "measure",
+    "pack",
+    "submit_unwrap",
+    "unwrap",
+]
+
+__version__: str
+
+class BleUnwrapError(Exception): ...
+class InvalidMeshError(BleUnwrapError): ...
+class InvalidArgumentError(BleUnwrapError): ...
+class Cancelled(BleUnwrapError): ...
+class InternalError(BleUnwrapError): ...
+
+@type_check_only
+class _Threads(TypedDict, total=False):
+    preset: Literal["default", "paper"]
+    threads: int
+
+@type_check_only
+class _GeodesicSettings(_Threads, total=False):
+    geodesics: Literal["fast_marching", "dijkstra"]
+
+@type_check_only
+class _EmbeddingSettings(_Threads, total=False):
+    seed: int
+    model: Literal["default", "paper", "isomap"]
+    kernel_width: float | None
+    relaxation: float
+    max_sweeps: int
+    tolerance: float
+    update: Literal["serial", "parallel"]
+    initial: Literal["mds", "random"]
+
+@type_check_only
+class _MeasureSettings(_Threads, total=False):
+    margin: float
+    texture_size: int | tuple[int, int]
+
+@type_check_only
+class _PackSettings(_MeasureSettings, total=False):
+    rotation: Literal["any", "quarter", "none"]
+
+@type_check_only
+class _Settings(_GeodesicSettings, _EmbeddingSettings, _PackSettings, total=False):
+    stretch_limit: float
+    weld: bool
+    merge: bool
+    holes: Literal["keep", "cut"]
+    chart_scale: Literal["uniform", "stretch"]
+    landmark_fraction: float
+    landmark_min: int
+    landmark_max: int | None
+    stretch_solver: Literal["newton", "line_search"]
+    stretch_iterations: int
+
+@final
+class Array(Buffer):
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+    @property
+    def format(self) -> str: ...
+    def __len__(self) -> int: ...
+    def __buffer__(self, flags: int, /) -> memoryview: ...
+
+@final
+class Atlas:
+    @property
+    def uv(self) -> Array: ...
+    @property
+    def chart(self) -> Array: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
+
+@final
+class Embedding:
+    @property
+    def coordinates(self) -> Array: ...
+    @property
+    def intercepts(self) -> Array: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
+
+@final
+class PackedCharts:
+    @property
+    def uv(self) -> Array: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
+
+@final
+class Job:
+    def __new__(cls) -> Job: ...
+    def progress(self) -> float: ...
+    def stage(self) -> str: ...
+    def cancel(self) -> None: ...
+    def is_cancelled(self) -> bool: ...
+    def is_finished(self) -> bool: ...
+    def wait(self, timeout: float | None = None) -> bool: ...
+    # An `Atlas` after `submit_unwrap`, else what the call that was given the job returned.
+    def result(self) -> Any: ...
+
+def unwrap(
+    positions: Buffer,
+    corner_vertices: Buffer,
+    face_offsets: Buffer,
+    *,
+    corner_triangles: Buffer | None = None,
+    seams: Buffer | None = None,
+    job: Job | None = None,
+    **settings: Unpack[_Settings],
+) -> Atlas: ...
+def submit_unwrap(
+    positions: Buffer,
+    corner_vertices: Buffer,
+    face_offsets: Buffer,
+    *,
+    corner_triangles: Buffer | None = None,
+    seams: Buffer | None = None,
+    job: Job | None = None,
+    **settings: Unpack[_Settings],
+) -> Job: ...
+def embed(
+    data: Buffer,
+    *,
+    kind: Literal["points", "distances", "affinities"] = "points",
+    dimensions: int = 2,
+    job: Job | None = None,
+    **settings: Unpack[_EmbeddingSettings],
+) -> Embedding: ...
+def geodesic_distances(
+    positions: Buffer,
+    corner_vertices: Buffer,
+    face_offsets: Buffer,
+    sources: Buffer,
+    *,
+    corner_triangles: Buffer | None = None,
+    job: Job | None = None,
+    **settings: Unpack[_GeodesicSettings],
+) -> Array: ...
+def measure(
+    positions: Buffer,
+    corner_vertices: Buffer,
+    face_offsets: Buffer,
+    uv: Buffer,
+    *,
+    chart: Buffer | None = None,
+    corner_triangles: Buffer | None = None,
+    job: Job | None = None,
+    **settings: Unpack[_MeasureSettings],
+) -> dict[str, Any]: ...
+def pack(
+    points: Buffer,
+    triangles: Buffer,
+    chart: Buffer,
+    *,
+    job: Job | None = None,
+    **settings: Unpack[_PackSettings],
+) -> PackedCharts: ...
+def default_settings(preset: Literal["default", "paper"] = "default") -> dict[str, Any]: ...

@@ -1,0 +1,199 @@
+//! The exceptions of the module, and the one place where errors of the core become exceptions.
+
+use std::fmt::Display;
+
+use ble_unwrap_core::UnwrapError;
+use ble_unwrap_core::embedding::EmbeddingError;
+use ble_unwrap_core::mesh::MeshError;
+use ble_unwrap_core::packing::PackError;
+use ble_unwrap_core::standalone::{DistancesError, LayoutError, RepackError};
+use pyo3::create_exception;
+use pyo3::exceptions::PyException;
+use pyo3::prelude::*;
+
+create_exception!(ble_unwrap_native, BleUnwrapError, PyException, "Base of all exceptions of this module.");
+create_exception!(
+    ble_unwrap_native,
+    InvalidMeshError,
+    BleUnwrapError,
+    "The arrays do not describe a mesh. The text names the first offending element."
+);
+create_exception!(
+    ble_unwrap_native,
+    InvalidArgumentError,
+    BleUnwrapError,
+    "An argument or a setting is not what it has to be. The text names it, what was expected and what was found."
+);
+create_exception!(
+    ble_unwrap_native,
+    Cancelled,
+    BleUnwrapError,
+    "The job was cancelled before it was finished. Nothing was produced."
+);
+create_exception!(
+    ble_unwrap_native,
+    InternalError,
+    BleUnwrapError,
+    "A defect of this library or a want of the machine, not of the input. Please report it."
+);
+
+/// Why a computation brought no result, as the worker leaves it: the exception to raise, and its text, which
+/// is the core's own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Failure {
+    kind: Kind,
+    text: String,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Mesh,
+    Argument,
+    Cancelled,
+    Internal,
+}
+
+impl Failure {
+    /// The core panicked.
+    pub(crate) fn panic(text: &str) -> Self {
+        Self { kind: Kind::Internal, text: format!("unexpected panic: {text}") }
+    }
+
+    /// The system gave no thread to work on.
+    pub(crate) fn threads(error: &dyn std::error::Error) -> Self {
+        Self { kind: Kind::Internal, text: format!("cannot start threads: {error}") }
+    }
+
+    /// The result could not become a Python object.
+    pub(crate) fn delivery(error: &PyErr) -> Self {
+        Self { kind: Kind::Internal, text: format!("cannot make the result: {error}") }
+    }
+
+    /// The exception to raise.
+    pub(crate) fn to_py_err(&self) -> PyErr {
+        let text = self.text.clone();
+        match self.kind {
+            Kind::Mesh => InvalidMeshError::new_err(text),
+            Kind::Argument => InvalidArgumentError::new_err(text),
+            Kind::Cancelled => Cancelled::new_err(text),
+            Kind::Internal => InternalError::new_err(text),
+        }
+    }
+}
+
+/// How an error of the core is raised. Exhaustive: a new variant in the core must be placed here.
+trait Raised: Display {
+    fn kind(&self) -> Kind;
+}
+
+impl<E: Raised> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self { kind: error.kind(), text: error.to_string() }
+    }
+}
+
+impl Raised for ble_unwrap_core::Cancelled {
+    fn kind(&self) -> Kind {
+        Kind::Cancelled
+    }
+}
+
+impl Raised for MeshError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::OffsetsStart { .. }
+            | Self::OffsetsEnd { .. }
+            | Self::OffsetsMissing { .. }
+            | Self::OffsetsDescend { .. }
+            | Self::TooFewCorners { .. }
+            | Self::VertexOutOfRange { .. }
+            | Self::TriangleCornerOutOfRange { .. }
+            | Self::TriangleAcrossFaces { .. }
+            | Self::SeamOutOfRange { .. }
+            | Self::TooLarge { .. }
+            | Self::NoFiniteFace { .. } => Kind::Mesh,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
+impl Raised for PackError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::NotFinite { .. } | Self::CornerOutOfRange { .. } | Self::Full => Kind::Argument,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
+impl Raised for UnwrapError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Mesh(error) => error.kind(),
+            Self::Setting { .. } => Kind::Argument,
+            Self::Pack(error) => error.kind(),
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
+impl Raised for EmbeddingError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::TooFewLandmarks { .. }
+            | Self::Unreachable { .. }
+            | Self::NoExtent
+            | Self::Collinear { .. }
+            | Self::InvalidSetting { .. }
+            | Self::WrongLength { .. }
+            | Self::NotFinite { .. }
+            | Self::DistanceOutOfRange { .. }
+            | Self::AffinityOutOfRange { .. }
+            | Self::TooFewPoints { .. }
+            | Self::NoLikelihood => Kind::Argument,
+            Self::Eigen(_) => Kind::Internal,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
+impl Raised for DistancesError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Mesh(error) => error.kind(),
+            Self::Source { .. } | Self::TooLarge { .. } => Kind::Argument,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
+impl Raised for LayoutError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Mesh(error) => error.kind(),
+            Self::UvCount { .. } | Self::ChartCount { .. } => Kind::Argument,
+            Self::Triangles(_) => Kind::Mesh,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
+impl Raised for RepackError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::ChartCount { .. } | Self::PointOutOfRange { .. } | Self::SharedPoint { .. } => Kind::Argument,
+            Self::Pack(error) => error.kind(),
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
+/// Adds the exceptions to the module.
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    module.add("BleUnwrapError", py.get_type::<BleUnwrapError>())?;
+    module.add("InvalidMeshError", py.get_type::<InvalidMeshError>())?;
+    module.add("InvalidArgumentError", py.get_type::<InvalidArgumentError>())?;
+    module.add("Cancelled", py.get_type::<Cancelled>())?;
+    module.add("InternalError", py.get_type::<InternalError>())
+}

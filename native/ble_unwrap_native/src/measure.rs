@@ -1,0 +1,90 @@
+//! `measure`.
+
+use ble_unwrap_core::metrics::Texture;
+use ble_unwrap_core::standalone::measure_layout;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{self, Argument};
+use crate::errors::Failure;
+use crate::job::Job;
+use crate::report;
+use crate::settings::{self, Function};
+use crate::unwrap::MeshArrays;
+
+/// Measure the quality of a UV map, whoever made it.
+///
+/// Parameters
+/// ----------
+/// positions, corner_vertices, face_offsets, corner_triangles
+///     The mesh, as for ``unwrap``.
+/// uv : (c, 2) float32 or float64
+///     A UV for each corner; rounded to float32.
+/// chart : (f,) int32 or int64, optional
+///     Negative for faces without UVs. Charts themselves are found from the UVs.
+/// job : Job, optional
+///     A new ``Job``, by which another thread watches or cancels this call.
+/// texture_size : int or (int, int)
+///     Width and height of the texture in texels.
+/// margin : float
+///     Distance of charts, in texels, at least up to half of which gaps are searched for.
+/// threads : int
+///     Threads to work with; 0 for as many as the machine has. The result does not depend on it.
+///
+/// Returns
+/// -------
+/// dict
+///     ``charts`` (joined over UV edges), ``islands`` (joined over UV vertices), ``faces``, ``unmapped_faces``,
+///     ``triangles``, ``degenerate_triangles``, ``uv_degenerate_triangles``;
+///     L2 stretch: ``l2`` at the layout's best scale, ``l2_chart_scale`` with each chart at its own, ``l2_worst_chart``,
+///     ``chart_l2`` (a list); ``l_infinity``, ``angle_distortion``, ``area_distortion`` (all 1 at best);
+///     ``flips`` (triangles), ``overlaps`` and ``overlaps_between`` islands (pairs of triangles; lower bounds unless
+///     ``overlaps_complete``); ``seam_length`` over the root of the area and ``seam_length_absolute``;
+///     ``packing_efficiency``, ``gap_texels`` between islands (at most 8 or twice ``margin``; an upper bound unless
+///     ``gap_complete``), ``uv_box``. Where nothing could be measured, NaN.
+///
+/// Raises
+/// ------
+/// InvalidArgumentError
+///     If an array has the wrong type, shape or length, or a setting is unknown or out of range.
+/// InvalidMeshError
+///     If indices or offsets do not make a mesh.
+/// Cancelled
+///     If the job was cancelled.
+///
+/// Notes
+/// -----
+/// Guaranteed: any UVs will do, finite or not. Not guaranteed: exactness; overlaps below 1e-9 of the layout go unseen.
+/// Vertices are not welded. O(n log n); about two seconds for a million triangles on two cores.
+///
+/// Sander, Snyder, Gortler, Hoppe: Texture mapping progressive meshes, SIGGRAPH 2001.
+#[pyfunction]
+#[pyo3(signature = (positions, corner_vertices, face_offsets, uv, *, chart=None, corner_triangles=None, job=None, **settings))]
+pub(crate) fn measure(
+    py: Python<'_>,
+    positions: &Bound<'_, PyAny>,
+    corner_vertices: &Bound<'_, PyAny>,
+    face_offsets: &Bound<'_, PyAny>,
+    uv: &Bound<'_, PyAny>,
+    chart: Option<&Bound<'_, PyAny>>,
+    corner_triangles: Option<&Bound<'_, PyAny>>,
+    job: Option<Bound<'_, Job>>,
+    settings: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Py<PyAny>> {
+    let call = settings::from_keywords(settings, Function::Measure)?;
+    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, None)?;
+    let uv = arrays::single_rows(uv, Argument { name: "uv", shape: "(c, 2)" })?;
+    let chart =
+        chart.map(|given| arrays::indices(given, Argument { name: "chart", shape: "(f,)" })).transpose()?;
+    let packing = call.settings.packing;
+    let texture = Texture { width: packing.width, height: packing.height, margin: packing.margin_texels };
+    let job = Job::given_or_new(py, job)?;
+    job.get().start(
+        call.threads,
+        move |progress| {
+            measure_layout(&mesh.input(), &uv, chart.as_deref(), texture, progress).map_err(Failure::from)
+        },
+        |py, layout| Ok(report::measures_to_dict(py, layout)?.into_any().unbind()),
+    )?;
+    job.get().finish(py)
+}

@@ -1,0 +1,97 @@
+//! `pack`.
+
+use ble_unwrap_core::standalone::repack;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{self, Argument};
+use crate::errors::Failure;
+use crate::job::Job;
+use crate::owned_array::Array;
+use crate::settings::{self, Function};
+
+/// Charts in their new places.
+///
+/// Attributes
+/// ----------
+/// uv : Array, (n, 2) float32
+///     A place in [0, 1]² for each point; (0, 0) for points of no chart.
+/// report : dict
+///     ``charts``, ``packing_efficiency``, ``texels_per_unit``, ``texture_size`` and ``specks``: charts so small that
+///     they were enlarged to be seen at all.
+#[pyclass(frozen, get_all, module = "ble_unwrap_native")]
+pub(crate) struct PackedCharts {
+    uv: Py<Array>,
+    report: Py<PyDict>,
+}
+
+/// Move, turn and scale charts so that they fill the unit square and keep their margin.
+///
+/// Parameters
+/// ----------
+/// points : (n, 2) float32 or float64
+///     Points of the charts, in any unit.
+/// triangles : (t, 3) int32 or int64
+///     Three points each.
+/// chart : (t,) int32 or int64
+///     The chart of each triangle. Triangles of a negative chart are left out. A point belongs to one chart.
+/// job : Job, optional
+///     A new ``Job``, by which another thread watches or cancels this call.
+/// margin : float
+///     Least distance between charts, in texels; half of it is kept to the border.
+/// texture_size : int or (int, int)
+///     Width and height of the texture in texels. Charts keep their shape in texels.
+/// rotation : {"any", "quarter", "none"}
+///     How charts may be turned. They are never mirrored.
+/// threads : int
+///     Threads to work with; 0 for as many as the machine has. The result does not depend on it.
+///
+/// Returns
+/// -------
+/// PackedCharts
+///     ``uv`` (n, 2) float32 and ``report``.
+///
+/// Raises
+/// ------
+/// InvalidArgumentError
+///     If an array has the wrong type, shape or indices, a setting is unknown or out of range, or the charts do not fit
+///     with their margin.
+/// Cancelled
+///     If the job was cancelled.
+///
+/// Notes
+/// -----
+/// All charts are scaled by the same factor, specks aside. Charts that overlap themselves are packed as they are.
+#[pyfunction]
+#[pyo3(signature = (points, triangles, chart, *, job=None, **settings))]
+pub(crate) fn pack(
+    py: Python<'_>,
+    points: &Bound<'_, PyAny>,
+    triangles: &Bound<'_, PyAny>,
+    chart: &Bound<'_, PyAny>,
+    job: Option<Bound<'_, Job>>,
+    settings: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Py<PyAny>> {
+    let call = settings::from_keywords(settings, Function::Pack)?;
+    let points = arrays::real_rows(points, Argument { name: "points", shape: "(n, 2)" })?;
+    let triangles = arrays::index_rows(triangles, Argument { name: "triangles", shape: "(t, 3)" })?;
+    let chart = arrays::indices(chart, Argument { name: "chart", shape: "(t,)" })?;
+    let job = Job::given_or_new(py, job)?;
+    job.get().start(
+        call.threads,
+        move |progress| {
+            repack(&points, &triangles, &chart, &call.settings.packing, progress).map_err(Failure::from)
+        },
+        |py, repacked| {
+            let report = PyDict::new(py);
+            report.set_item("charts", repacked.charts)?;
+            report.set_item("packing_efficiency", repacked.packed.efficiency)?;
+            report.set_item("texels_per_unit", repacked.packed.texels_per_unit)?;
+            report.set_item("texture_size", (repacked.packed.size[0], repacked.packed.size[1]))?;
+            report.set_item("specks", repacked.packed.specks)?;
+            let uv = Py::new(py, Array::from_f32_rows(repacked.uv))?;
+            Ok(Py::new(py, PackedCharts { uv, report: report.unbind() })?.into_any())
+        },
+    )?;
+    job.get().finish(py)
+}

@@ -1,0 +1,100 @@
+//! Reports and measures as dictionaries. Every field is named, so that a new one in the core is not forgotten here.
+
+use ble_unwrap_core::Report;
+use ble_unwrap_core::standalone::LayoutMeasures;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// The report of an unwrap.
+pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyDict>> {
+    let Report {
+        charts,
+        faces,
+        unmapped_faces,
+        l2,
+        l2_chart_scale,
+        l2_worst_chart,
+        worst_chart,
+        l_infinity,
+        angle_distortion,
+        area_distortion,
+        flips,
+        overlaps,
+        seam_length,
+        seam_length_absolute,
+        packing_efficiency,
+        gap_texels,
+        seconds,
+        rungs,
+        charts_over_limit,
+        warnings,
+    } = report;
+    let dict = PyDict::new(py);
+    dict.set_item("charts", charts)?;
+    dict.set_item("faces", faces)?;
+    dict.set_item("unmapped_faces", unmapped_faces)?;
+    dict.set_item("l2", l2)?;
+    dict.set_item("l2_chart_scale", l2_chart_scale)?;
+    dict.set_item("l2_worst_chart", l2_worst_chart)?;
+    dict.set_item("worst_chart", worst_chart)?;
+    dict.set_item("l_infinity", l_infinity)?;
+    dict.set_item("angle_distortion", angle_distortion)?;
+    dict.set_item("area_distortion", area_distortion)?;
+    dict.set_item("flips", flips)?;
+    dict.set_item("overlaps", overlaps)?;
+    dict.set_item("seam_length", seam_length)?;
+    dict.set_item("seam_length_absolute", seam_length_absolute)?;
+    dict.set_item("packing_efficiency", packing_efficiency)?;
+    dict.set_item("gap_texels", gap_texels)?;
+    dict.set_item("seconds", sums(py, seconds)?)?;
+    dict.set_item("rungs", sums(py, rungs)?)?;
+    dict.set_item("charts_over_limit", charts_over_limit)?;
+    dict.set_item("warnings", warnings)?;
+    Ok(dict)
+}
+
+/// The measures of a layout, with the keys of a report and some of their own.
+pub(crate) fn measures_to_dict(py: Python<'_>, layout: LayoutMeasures) -> PyResult<Bound<'_, PyDict>> {
+    let LayoutMeasures { faces, unmapped_faces, measures } = layout;
+    let dict = PyDict::new(py);
+    dict.set_item("charts", measures.charts)?;
+    dict.set_item("islands", measures.islands)?;
+    dict.set_item("faces", faces)?;
+    dict.set_item("unmapped_faces", unmapped_faces)?;
+    dict.set_item("triangles", measures.faces)?;
+    dict.set_item("degenerate_triangles", measures.degenerate_faces)?;
+    dict.set_item("uv_degenerate_triangles", measures.uv_degenerate_faces)?;
+    dict.set_item("l2", measures.l2)?;
+    dict.set_item("l2_chart_scale", measures.l2_chart_scale)?;
+    dict.set_item("l2_worst_chart", measures.l2_worst_chart)?;
+    dict.set_item("l_infinity", measures.l_infinity)?;
+    dict.set_item("angle_distortion", measures.angle_distortion)?;
+    dict.set_item("area_distortion", measures.area_distortion)?;
+    dict.set_item("flips", measures.flips)?;
+    dict.set_item("overlaps", measures.overlaps)?;
+    dict.set_item("overlaps_between", measures.overlaps_between)?;
+    dict.set_item("overlaps_complete", measures.overlaps_complete)?;
+    dict.set_item("seam_length", measures.seam_length)?;
+    dict.set_item("seam_length_absolute", measures.seam_length_absolute)?;
+    dict.set_item("packing_efficiency", measures.packing_efficiency)?;
+    dict.set_item("gap_texels", measures.gap_texels)?;
+    dict.set_item("gap_complete", measures.gap_complete)?;
+    dict.set_item("uv_box", measures.uv_box)?;
+    dict.set_item("chart_l2", measures.per_chart.iter().map(|chart| chart.l2).collect::<Vec<_>>())?;
+    Ok(dict)
+}
+
+/// A dictionary of named numbers, those of one name added up.
+fn sums<'py, T>(py: Python<'py>, pairs: &[(&'static str, T)]) -> PyResult<Bound<'py, PyDict>>
+where
+    T: Copy + std::ops::Add<Output = T> + IntoPyObject<'py>,
+{
+    let dict = PyDict::new(py);
+    for (at, &(name, first)) in pairs.iter().enumerate() {
+        if pairs[..at].iter().all(|&(earlier, _)| earlier != name) {
+            let rest = pairs[at + 1..].iter().filter(|pair| pair.0 == name);
+            dict.set_item(name, rest.fold(first, |sum, pair| sum + pair.1))?;
+        }
+    }
+    Ok(dict)
+}

@@ -1,0 +1,245 @@
+//! `unwrap` and `submit_unwrap`: arrays in, atlas out.
+
+use ble_unwrap_core::MeshInput;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{self, Argument};
+use crate::errors::Failure;
+use crate::job::Job;
+use crate::owned_array::Array;
+use crate::report;
+use crate::settings::{self, Call, Function};
+
+/// UVs of a mesh, and what is known about them.
+///
+/// Attributes
+/// ----------
+/// uv : Array, (c, 2) float32
+///     A UV in [0, 1]² for each corner; (0, 0) at corners of faces without a chart.
+/// chart : Array, (f,) int32
+///     The chart of each face, from 0; -1 for faces that have a vertex with non-finite coordinates.
+/// report : dict
+///     Measures of the result, taken from ``uv`` as it stands; see ``unwrap``.
+#[pyclass(frozen, get_all, module = "ble_unwrap_native")]
+pub(crate) struct Atlas {
+    uv: Py<Array>,
+    chart: Py<Array>,
+    report: Py<PyDict>,
+}
+
+#[pymethods]
+impl Atlas {
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let report = self.report.bind(py);
+        let of = |key| report.get_item(key).map(|value| value.map_or_else(String::new, |value| value.to_string()));
+        Ok(format!("Atlas(faces={}, charts={}, l2={})", of("faces")?, of("charts")?, of("l2")?))
+    }
+}
+
+/// A mesh copied out of Python's arrays.
+pub(crate) struct MeshArrays {
+    positions: Vec<[f64; 3]>,
+    corner_vertices: Vec<i32>,
+    face_offsets: Vec<i32>,
+    corner_triangles: Option<Vec<[i32; 3]>>,
+    seams: Vec<[i32; 2]>,
+}
+
+impl MeshArrays {
+    /// Checks and copies the arrays that describe a mesh to every function of the module.
+    pub(crate) fn new(
+        positions: &Bound<'_, PyAny>,
+        corner_vertices: &Bound<'_, PyAny>,
+        face_offsets: &Bound<'_, PyAny>,
+        corner_triangles: Option<&Bound<'_, PyAny>>,
+        seams: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let triangles = Argument { name: "corner_triangles", shape: "(t, 3)" };
+        let cuts = Argument { name: "seams", shape: "(s, 2)" };
+        Ok(Self {
+            positions: arrays::real_rows(positions, Argument { name: "positions", shape: "(n, 3)" })?,
+            corner_vertices: arrays::indices(corner_vertices, Argument { name: "corner_vertices", shape: "(c,)" })?,
+            face_offsets: arrays::indices(face_offsets, Argument { name: "face_offsets", shape: "(f + 1,)" })?,
+            corner_triangles: corner_triangles.map(|given| arrays::index_rows(given, triangles)).transpose()?,
+            seams: seams.map(|given| arrays::index_rows(given, cuts)).transpose()?.unwrap_or_default(),
+        })
+    }
+
+    /// The view of the arrays that the core takes.
+    pub(crate) fn input(&self) -> MeshInput<'_> {
+        MeshInput {
+            positions: &self.positions,
+            corner_vertices: &self.corner_vertices,
+            face_offsets: &self.face_offsets,
+            corner_triangles: self.corner_triangles.as_deref(),
+            seams: &self.seams,
+        }
+    }
+
+    /// Number of vertices.
+    pub(crate) fn vertex_count(&self) -> usize {
+        self.positions.len()
+    }
+}
+
+fn start(job: &Job, mesh: MeshArrays, call: Call) -> PyResult<()> {
+    job.start(
+        call.threads,
+        move |progress| ble_unwrap_core::unwrap(&mesh.input(), &call.settings, progress).map_err(Failure::from),
+        |py, atlas| {
+            let uv = Py::new(py, Array::from_f32_rows(atlas.uv))?;
+            let chart = Py::new(py, Array::from_i32(atlas.chart))?;
+            let report = report::to_dict(py, &atlas.report)?.unbind();
+            Ok(Py::new(py, Atlas { uv, chart, report })?.into_any())
+        },
+    )
+}
+
+/// Cut a surface into charts, flatten them under a stretch limit and pack them into one atlas.
+///
+/// Every face with finite vertices gets UVs, whatever the mesh: closed, non-manifold, self-intersecting, one-sided,
+/// with holes, handles, n-gons or faces without area.
+///
+/// Parameters
+/// ----------
+/// positions : (n, 3) float32 or float64
+///     Vertices, in any unit.
+/// corner_vertices : (c,) int32 or int64
+///     The vertex of each corner, face by face.
+/// face_offsets : (f + 1,) int32 or int64
+///     The first corner of each face, and ``c`` at the end.
+/// corner_triangles : (t, 3) int32 or int64, optional
+///     Triangles by corner, which together triangulate the faces. Made if absent or if they do not cover a face.
+/// seams : (s, 2) int32 or int64, optional
+///     Edges to be cut, by their two vertices. Pairs that are no edge do nothing.
+/// job : Job, optional
+///     A new ``Job``, by which another thread watches or cancels this call.
+/// preset : {"default", "paper"}
+///     Where settings that are not given come from. ``"paper"``: the published method as printed.
+/// stretch_limit : float, above 1
+///     Upper bound of the L2 stretch of every chart. 1 is isometric; the default is 1.1.
+/// weld : bool
+///     Whether vertices at the same position count as one.
+/// merge : bool
+///     Whether charts are joined again where their union stays under the limit.
+/// holes : {"keep", "cut"}
+///     Whether charts may have holes or are cut to disks.
+/// chart_scale : {"uniform", "stretch"}
+///     The same texel density for all charts, or more for stretched ones.
+/// seed : int
+///     Seed of every random choice.
+/// geodesics : {"fast_marching", "dijkstra"}
+///     How distances on the surface are measured.
+/// landmark_fraction, landmark_min, landmark_max : float, int, int or None
+///     Number of landmarks of a piece of surface: this share of its vertices, within these bounds.
+/// model : {"default", "paper", "isomap"}
+///     How landmarks are embedded in the plane: Bernoulli logistic embedding with intercepts, the model as printed, or
+///     classical scaling of geodesic distances.
+/// kernel_width : float or None
+///     Width of the affinity kernel over the mean squared distance; ``None`` for the model's own.
+/// relaxation : float, above 0 and below 2
+///     Over-relaxation of the embedding's updates.
+/// max_sweeps, tolerance : int, float
+///     The embedding ends after so many sweeps, or when the likelihood changes by less than this share.
+/// update : {"serial", "parallel"}
+///     Order of the embedding's updates; serial ones never lower the likelihood.
+/// initial : {"mds", "random"}
+///     Start of the embedding.
+/// stretch_solver : {"newton", "line_search"}
+///     How stretch is minimised: projected Newton steps or the line searches of Sander et al.
+/// stretch_iterations : int
+///     Most iterations of that.
+/// margin : float
+///     Least distance between charts, in texels of ``texture_size``.
+/// texture_size : int or (int, int)
+///     Width and height of the texture in texels. UVs of a texture that is not square are stretched to the unit square.
+/// rotation : {"any", "quarter", "none"}
+///     How charts may be turned in packing.
+/// threads : int
+///     Threads to work with; 0 for as many as the machine has. The result does not depend on it.
+///
+/// Returns
+/// -------
+/// Atlas
+///     ``uv`` (c, 2) float32, ``chart`` (f,) int32 and ``report``, a dict with ``charts``, ``faces``,
+///     ``unmapped_faces``, ``l2``, ``l2_chart_scale``, ``l2_worst_chart``, ``l_infinity``, ``angle_distortion``,
+///     ``area_distortion``, ``flips``, ``overlaps``, ``seam_length``, ``packing_efficiency``, ``gap_texels``,
+///     ``charts_over_limit``, ``rungs``, ``seconds``, ``warnings`` and more.
+///
+/// Raises
+/// ------
+/// InvalidArgumentError
+///     If an array has the wrong type or shape, or a setting is unknown or out of range. The text names it.
+/// Cancelled
+///     If the job was cancelled. A job cancelled before the call does not look at the mesh, but arrays and settings
+///     are checked first.
+/// InvalidMeshError
+///     If indices or offsets do not make a mesh. The text names the first wrong element.
+/// InternalError
+///     If the library is at fault.
+///
+/// Notes
+/// -----
+/// Guaranteed, and checked on the float32 values returned: no triangle is flipped, no chart overlaps itself or another,
+/// charts keep the margin, each chart is under the limit or counted in ``charts_over_limit`` (a single face may not
+/// flatten under it). The result is the same, bit for bit, for any number of threads. Not guaranteed: the fewest charts
+/// or the shortest seams.
+///
+/// The arrays are copied before work begins; other Python threads run meanwhile. Ctrl-C raises ``KeyboardInterrupt``.
+/// Time is near-linear in the number of faces.
+///
+/// Source: Bernoulli Embedding Model and Its Application in Texture Mapping, 2006, with the extensions that
+/// native/ARCHITECTURE.md describes.
+#[pyfunction]
+#[pyo3(signature = (positions, corner_vertices, face_offsets, *, corner_triangles=None, seams=None, job=None, **settings))]
+pub(crate) fn unwrap(
+    py: Python<'_>,
+    positions: &Bound<'_, PyAny>,
+    corner_vertices: &Bound<'_, PyAny>,
+    face_offsets: &Bound<'_, PyAny>,
+    corner_triangles: Option<&Bound<'_, PyAny>>,
+    seams: Option<&Bound<'_, PyAny>>,
+    job: Option<Bound<'_, Job>>,
+    settings: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Py<PyAny>> {
+    let call = settings::from_keywords(settings, Function::Unwrap)?;
+    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, seams)?;
+    let job = Job::given_or_new(py, job)?;
+    start(job.get(), mesh, call)?;
+    job.get().finish(py)
+}
+
+/// Start ``unwrap`` on a thread of its own and return the job at once.
+///
+/// Takes what ``unwrap`` takes. Poll ``progress()`` and ``is_finished()``, stop it with ``cancel()``, collect the
+/// ``Atlas`` with ``result()``.
+///
+/// Returns
+/// -------
+/// Job
+///     The running job: ``job`` if it was given, else a new one.
+///
+/// Raises
+/// ------
+/// InvalidArgumentError
+///     If an array has the wrong type or shape, or a setting is unknown or out of range. All other errors, including
+///     ``InvalidMeshError``, are raised by ``Job.result``.
+#[pyfunction]
+#[pyo3(signature = (positions, corner_vertices, face_offsets, *, corner_triangles=None, seams=None, job=None, **settings))]
+pub(crate) fn submit_unwrap<'py>(
+    py: Python<'py>,
+    positions: &Bound<'py, PyAny>,
+    corner_vertices: &Bound<'py, PyAny>,
+    face_offsets: &Bound<'py, PyAny>,
+    corner_triangles: Option<&Bound<'py, PyAny>>,
+    seams: Option<&Bound<'py, PyAny>>,
+    job: Option<Bound<'py, Job>>,
+    settings: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, Job>> {
+    let call = settings::from_keywords(settings, Function::Unwrap)?;
+    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, seams)?;
+    let job = Job::given_or_new(py, job)?;
+    start(job.get(), mesh, call)?;
+    Ok(job)
+}

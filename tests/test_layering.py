@@ -1,0 +1,270 @@
+"""Who may import whom: the layers of native/ARCHITECTURE.md, kept by a test.
+
+A rule without a test leaks. The core's modules are read as text (comments, strings and unit tests apart), the add-on
+and the scripts as syntax trees. A new module has to be entered in the table below.
+"""
+
+import ast
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+CORE = ROOT / "native/ble_unwrap_core/src"
+
+FOUNDATION = {"progress", "linalg", "mesh"}
+TOOLS = FOUNDATION | {"geodesics", "distortion"}
+# In the order of the pipeline. A stage sees the types that earlier stages put out, never their functions.
+STAGES = ["segmentation", "charts", "embedding", "stretch", "packing"]
+# Module of the core -> modules all of whose public items it may use.
+MAY_USE = {
+    "progress": set(),
+    "linalg": {"progress"},
+    "mesh": {"progress"},
+    "geodesics": FOUNDATION,
+    "distortion": FOUNDATION,
+    **{stage: TOOLS for stage in STAGES},
+    "metrics": TOOLS - {"geodesics"},
+    "verify": TOOLS - {"geodesics"},
+    # What sees the whole.
+    "pipeline": None,
+    "settings": None,
+    "error": None,
+    "lib": None,
+}
+# Module -> modules of which it may name types (in CamelCase) only.
+MAY_NAME_TYPES_OF = {
+    **{stage: set(STAGES[:i]) for i, stage in enumerate(STAGES)},
+    "metrics": {"charts", "packing"},
+    "verify": {"charts", "packing", "metrics"},
+}
+
+
+def without_comments_and_tests(source: str) -> str:
+    """Rust source without comments, string contents and the unit tests at its end."""
+    source = re.sub(r"(?ms)^\s*#\[cfg\(test\)\]\s*(?:#\[[^\]]*\]\s*)*mod \w+ \{.*", "", source)
+    source = re.sub(r"(?m)^\s*#\[cfg\(test\)\]\s*\n\s*(?:pub(?:\([^)]*\))?\s+)?(?:mod|use) [^;]*;", "", source)
+    source = re.sub(r'"(?:\\.|[^"\\])*"', '""', source, flags=re.S)
+    source = re.sub(r"//[^\n]*", "", source)
+    return re.sub(r"/\*.*?\*/", "", source, flags=re.S)
+
+
+def use_tree(text: str, prefix: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
+    """The paths of a `use` tree such as `crate::{mesh::{TriMesh, FaceId as F}, progress::Cancelled}`."""
+    parts, depth, start = [], 0, 0
+    for i, c in enumerate(text):
+        depth += (c == "{") - (c == "}")
+        if c == "," and depth == 0:
+            parts.append(text[start:i])
+            start = i + 1
+    parts.append(text[start:])
+    paths = []
+    for part in filter(None, (p.strip() for p in parts)):
+        if "{" in part:
+            head, tail = part.split("{", 1)
+            names = tuple(n for n in head.strip().split("::") if n)
+            paths += use_tree(tail.rsplit("}", 1)[0], prefix + names)
+        else:
+            names = tuple(part.split(" as ")[0].strip().split("::"))
+            paths.append(prefix + names)
+    return paths
+
+
+def module_path(file: Path) -> tuple[str, ...]:
+    parts = file.relative_to(CORE).with_suffix("").parts
+    return parts[:-1] if parts[-1] == "mod" else parts
+
+
+def absolute(path: tuple[str, ...], module: tuple[str, ...]) -> tuple[str, ...] | None:
+    """A path from the root of the crate, or `None` for a path into another crate or into the module itself."""
+    path = tuple(name.strip() for name in path)
+    if path[0] == "crate":
+        return path[1:]
+    here = module
+    while path and path[0] == "super":
+        here, path = here[:-1], path[1:]
+    return here + path if here != module else None
+
+
+def references(file: Path) -> set[tuple[str, ...]]:
+    """Every path of a core file that leads to another module of the core, from the root of the crate."""
+    source = without_comments_and_tests(file.read_text(encoding="utf-8"))
+    module = module_path(file)
+    found = []
+    for tree in re.findall(r"\buse\s+([^;]+);", source):
+        found += use_tree(tree)
+    found += [tuple(p.split("::")) for p in re.findall(r"\b((?:crate|super)(?:::\w+)+)", source)]
+    paths = {absolute(path, module) for path in found}
+    return {path for path in paths if path}
+
+
+def reexports() -> dict[str, str]:
+    """Name at the root of the crate -> module it comes from."""
+    source = without_comments_and_tests((CORE / "lib.rs").read_text(encoding="utf-8"))
+    names = {}
+    for tree in re.findall(r"\bpub use\s+([^;]+);", source):
+        for path in use_tree(tree):
+            path = path[1:] if path[0] in ("crate", "self") else path
+            if len(path) > 1:
+                names[path[-1]] = path[0]
+    return names
+
+
+def offences(file: Path, root_names: dict[str, str]) -> list[str]:
+    me = (module_path(file) or ("lib",))[0]
+    if me not in MAY_USE:
+        return [f"{file.name}: the module {me} is not in the table of layers"]
+    allowed, types_of = MAY_USE[me], MAY_NAME_TYPES_OF.get(me, set())
+    if allowed is None:
+        return []
+    found = []
+    for path in sorted(references(file)):
+        target, item = (root_names[path[0]], path[0]) if path[0] in root_names else (path[0], path[-1])
+        is_type = item[:1].isupper() and item != "*"
+        if target == me or target in allowed or (target in types_of and (is_type or len(path) == 1)):
+            continue
+        what = f"{me} uses {'::'.join(path)}"
+        if target in types_of:
+            what += f": of {target} only types, not functions"
+        found.append(f"{file.relative_to(CORE)}: {what}")
+    return found
+
+
+def test_core_layers():
+    root_names = reexports()
+    files = sorted(CORE.rglob("*.rs"))
+    assert len(files) > 5, "the core was not found"
+    assert not [offence for file in files for offence in offences(file, root_names)]
+
+
+def test_core_neither_prints_nor_opens_files():
+    forbidden = re.compile(r"\b(?:std::(?:fs|io|net|process|env)\b|e?print(?:ln)?!|dbg!|Instant::now|SystemTime)")
+    found = [
+        f"{file.relative_to(CORE)}: {match[0]}"
+        for file in sorted(CORE.rglob("*.rs"))
+        for match in [forbidden.search(without_comments_and_tests(file.read_text(encoding="utf-8")))]
+        if match
+        and not (match[0] == "Instant::now" and module_path(file)[:1] == ("pipeline",))  # seconds of the report
+    ]
+    assert not found
+
+
+@pytest.mark.parametrize(
+    ("crate", "allowed"),
+    [
+        ("ble_unwrap_core", {"faer", "nalgebra", "rayon", "robust", "thiserror"}),
+        ("ble_unwrap_fixtures", {"toml", "serde"}),
+        ("ble_unwrap_native", {"ble_unwrap_core", "pyo3", "rayon"}),
+    ],
+)
+def test_crate_dependencies(crate, allowed):
+    manifest = tomllib.loads((ROOT / "native" / crate / "Cargo.toml").read_text(encoding="utf-8"))
+    assert set(manifest.get("dependencies", {})) <= allowed
+
+
+def test_the_binding_uses_the_core_by_its_public_names_only():
+    """No algorithm in the binding: it neither loops over faces nor names the core's connectivity."""
+    inner = re.compile(r"\b(?:FaceId|HalfedgeId|VertexId|TriMesh|nalgebra|faer)\b")
+    for file in sorted((ROOT / "native/ble_unwrap_native/src").glob("*.rs")):
+        match = inner.search(without_comments_and_tests(file.read_text(encoding="utf-8")))
+        assert not match, f"{file.name} names {match[0]}"
+
+
+# Python -------------------------------------------------------------------------------------------------------------
+
+PYTHON = sorted([*(ROOT / "addon").rglob("*.py"), *(ROOT / "blender_scripts").rglob("*.py")])
+
+
+def imports(file: Path) -> set[str]:
+    """Names of imported modules, wherever in the file: absolute ones as they are, relative ones with one leading dot
+    and, below it, the path from the root of the add-on."""
+    package = file.relative_to(ROOT).parts[1:-1]
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), str(file))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            if node.level == 0:
+                found.add(node.module)
+                continue
+            base = list(package[: len(package) - (node.level - 1)])
+            base += node.module.split(".") if node.module else []
+            if node.module:
+                found.add("." + ".".join(base))
+            else:
+                found |= {"." + ".".join([*base, alias.name]) for alias in node.names}
+    return found
+
+
+def tops(names: set[str]) -> set[str]:
+    """First components; a relative name keeps its dot."""
+    return {("." if n.startswith(".") else "") + n.lstrip(".").split(".")[0] for n in names}
+
+
+# File of the add-on -> what it never imports.
+NEVER = {
+    "mesh_bridge.py": {".engine", "ble_unwrap_native"},
+    "operators": {"ble_unwrap_native"},
+    "panel.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
+    "menu.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
+    "preferences.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
+    "properties.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
+    "engine.py": {"bpy", "bmesh", ".mesh_bridge", ".operators", ".properties"},
+}
+
+
+@pytest.mark.skipif(not PYTHON, reason="there is no add-on in this tree")
+@pytest.mark.parametrize("file", PYTHON, ids=lambda f: str(f.relative_to(ROOT)))
+def test_python_layers(file):
+    names = tops(imports(file))
+    folder, key = file.relative_to(ROOT).parts[:2]
+    assert not names & NEVER.get(key, set()) if folder == "addon" else True
+    if (folder, key) != ("addon", "engine.py"):
+        assert "ble_unwrap_native" not in names, "only addon/engine.py talks to the native module"
+    if folder == "addon":
+        # An extension's absolute name varies with the repository it is installed from.
+        allowed = {"bpy", "bmesh", "mathutils", "numpy", "addon_utils", "bl_ext", "gpu", "ble_unwrap_native"}
+        foreign = {n for n in names if not n.startswith(".")} - allowed - set(sys.stdlib_module_names)
+        assert not foreign, "an extension has only Blender's Python; its own modules are imported relatively"
+
+
+# The test itself ----------------------------------------------------------------------------------------------------
+
+
+def test_use_trees_are_read():
+    tree = "crate::{mesh::{TriMesh, FaceId as F}, progress::Cancelled, settings}"
+    assert use_tree(tree) == [
+        ("crate", "mesh", "TriMesh"),
+        ("crate", "mesh", "FaceId"),
+        ("crate", "progress", "Cancelled"),
+        ("crate", "settings"),
+    ]
+    assert absolute(("super", "super", "mesh", "X"), ("stretch", "newton")) == ("mesh", "X")
+    assert absolute(("super", "energy"), ("stretch", "newton")) == ("stretch", "energy")
+    assert absolute(("std", "fmt"), ("stretch",)) is None
+
+
+@pytest.mark.parametrize(
+    ("path", "source", "offended"),
+    [
+        ("mesh/repair.rs", "use crate::linalg::solve;", True),
+        ("mesh/repair.rs", "use crate::progress::Cancelled;", False),
+        ("mesh/repair.rs", "#[cfg(test)]\nmod tests { use crate::packing::pack; }", False),
+        ("linalg/sparse.rs", "fn f() { crate::mesh::measure::area() }", True),
+        ("charts/extract.rs", "use crate::segmentation::Parts;", False),
+        ("charts/extract.rs", "use crate::segmentation::segment;", True),
+        ("charts/extract.rs", "use super::super::embedding::Chart;", True),
+        ("charts/extract.rs", "// use crate::packing::pack;", False),
+        ("packing/place.rs", "use crate::Settings;", True),
+        ("unheard/of.rs", "", True),
+    ],
+)
+def test_an_offence_is_found(path, source, offended, tmp_path, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "CORE", tmp_path)
+    file = tmp_path / path
+    file.parent.mkdir()
+    file.write_text(source, encoding="utf-8")
+    assert bool(offences(file, {"Settings": "settings"})) is offended

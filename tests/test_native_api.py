@@ -1,0 +1,537 @@
+"""The native module as Python sees it: arrays, settings, exceptions, jobs. No Blender, and no mathematics, which the
+core tests itself."""
+
+import array
+import ctypes
+import gc
+import os
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import ble_unwrap_native as native
+import numpy as np
+import pytest
+from conftest import grid
+from numpy.testing import assert_array_equal
+
+HERE = Path(__file__).parent
+
+
+def arrays(result):
+    return np.asarray(result.uv), np.asarray(result.chart)
+
+
+# Results ------------------------------------------------------------------------------------------------------------
+
+
+def test_shapes_and_dtypes(ball):
+    positions, corners, offsets = ball
+    uv, chart = arrays(native.unwrap(*ball))
+    assert uv.shape == (len(corners), 2) and uv.dtype == np.float32
+    assert chart.shape == (len(offsets) - 1,) and chart.dtype == np.int32
+    assert np.isfinite(uv).all() and uv.min() >= 0 and uv.max() <= 1
+    assert chart.min() == 0 and set(chart) == set(range(chart.max() + 1))
+
+
+def test_report_describes_the_result(ball):
+    atlas = native.unwrap(*ball)
+    report = atlas.report
+    assert report["charts"] == np.asarray(atlas.chart).max() + 1
+    assert report["unmapped_faces"] == report["flips"] == report["overlaps"] == 0
+    assert 1 <= report["l2"] <= report["l2_worst_chart"] <= 1.1 + 1e-6
+    assert 0 < report["packing_efficiency"] <= 1
+    assert report["charts_over_limit"] in (0, [])
+    for key in ("l2_chart_scale", "l_infinity", "angle_distortion", "area_distortion", "seam_length"):
+        assert np.isfinite(report[key]), key
+    assert report["seam_length_absolute"] > 0 and report["gap_texels"] >= 4 - 1e-3
+    assert isinstance(report["rungs"], dict) and isinstance(report["warnings"], list)
+    assert "Atlas(" in repr(atlas)
+
+
+def test_a_square_is_unwrapped_without_distortion(square):
+    atlas = native.unwrap(*square)
+    assert atlas.report["charts"] == 1
+    assert atlas.report["l2"] == pytest.approx(1, abs=1e-6)
+
+
+def test_results_are_views_of_rust_memory(hill):
+    atlas = native.unwrap(*hill)
+    first, second = np.asarray(atlas.uv), np.asarray(atlas.uv)
+    assert np.shares_memory(first, second), "asarray copied"
+    assert not first.flags.owndata and not first.flags.writeable and first.flags.c_contiguous
+    with pytest.raises(ValueError, match="read-only"):
+        first[0] = 0
+    copy = np.array(atlas.uv)
+    copy[0] = 0.5
+    assert not np.shares_memory(copy, first)
+
+
+def test_views_keep_the_memory_alive(hill):
+    atlas = native.unwrap(*hill)
+    expected = np.array(atlas.uv)
+    view = np.asarray(atlas.uv)
+    del atlas
+    gc.collect()
+    noise = [np.random.default_rng(i).random(expected.shape, np.float32) for i in range(50)]
+    assert_array_equal(view, expected)
+    del noise
+
+
+def test_result_buffers_are_well_formed(hill):
+    atlas = native.unwrap(*hill)
+    view = memoryview(atlas.uv)
+    assert (view.format, view.itemsize, view.ndim, view.readonly) == ("f", 4, 2, True)
+    assert view.shape == atlas.uv.shape == (len(atlas.uv), 2) and view.strides == (8, 4)
+    assert atlas.uv.format == "f" and atlas.chart.format == "i"
+    assert bytes(atlas.chart) == np.asarray(atlas.chart).tobytes()
+    assert repr(atlas.chart) == f'Array(format="i", shape=({len(atlas.chart)},))'
+    with pytest.raises(BufferError, match="read-only"):
+        (ctypes.c_char * view.nbytes).from_buffer(atlas.uv)
+    with pytest.raises(TypeError):
+        native.Array()
+
+
+def test_an_empty_mesh_gives_an_empty_atlas():
+    uv, chart = arrays(native.unwrap(np.zeros((0, 3)), np.zeros(0, np.int32), np.zeros(1, np.int32)))
+    assert uv.shape == (0, 2) and chart.shape == (0,)
+
+
+# Arrays in ----------------------------------------------------------------------------------------------------------
+
+
+def variants(mesh):
+    positions, corners, offsets = mesh
+    yield "int64", (positions, corners.astype(np.int64), offsets.astype(np.int64))
+    yield "unsigned", (positions, corners.astype(np.uint32), offsets.astype(np.uint64))
+    yield "memoryview", (memoryview(positions), memoryview(corners), memoryview(offsets))
+    yield "array.array", (positions, array.array("i", corners), array.array("i", offsets))
+    yield "ctypes", (positions, (ctypes.c_int32 * len(corners))(*corners), offsets)
+    yield "fortran order", (np.asfortranarray(positions), corners, offsets)
+    padded = np.zeros((len(positions), 5))
+    padded[:, 1:4] = positions
+    yield "strided", (padded[:, 1:4], np.repeat(corners, 2)[::2], offsets[::-1].copy()[::-1])
+    record = np.zeros(len(positions), np.dtype([("tag", "u1"), ("p", "<f8", 3)]))
+    record["p"] = positions
+    yield "unaligned", (record["p"], corners, offsets)
+    frozen = positions.copy()
+    frozen.flags.writeable = False
+    yield "read-only", (frozen, corners, offsets)
+
+
+def test_any_buffer_gives_the_same_result(hill):
+    expected = arrays(native.unwrap(*hill))
+    for name, mesh in variants(hill):
+        found = arrays(native.unwrap(*mesh))
+        assert_array_equal(found[0], expected[0], err_msg=name)
+        assert_array_equal(found[1], expected[1], err_msg=name)
+
+
+def test_float32_positions(hill):
+    positions, corners, offsets = hill
+    single = positions.astype(np.float32)
+    expected = arrays(native.unwrap(single.astype(np.float64), corners, offsets))
+    assert_array_equal(arrays(native.unwrap(single, corners, offsets))[0], expected[0])
+
+
+SQUARE = grid(1, 1)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"positions": SQUARE[0].tolist()},
+            "positions: expected a float32 or float64 array of shape (n, 3), found list; pass a numpy array",
+        ),
+        (
+            {"positions": SQUARE[0][:, :2]},
+            "positions: expected a float32 or float64 array of shape (n, 3), found ndarray of float64 and shape (4, 2)",
+        ),
+        ({"positions": SQUARE[0].ravel()}, "of shape (n, 3), found ndarray of float64 and shape (12,)"),
+        ({"positions": SQUARE[0].astype(np.float16)}, "found ndarray of float16 and shape (4, 3)"),
+        ({"positions": SQUARE[0].astype(np.int32)}, "expected a float32 or float64 array"),
+        ({"positions": SQUARE[0].astype(">f8")}, "found ndarray of >f8 and shape (4, 3)"),
+        ({"positions": SQUARE[0].astype(object)}, "positions: expected a float32 or float64 array"),
+        ({"positions": np.zeros((4, 3), "S0")}, "positions: expected a float32 or float64 array"),
+        ({"positions": np.float64(1)}, "shape ()"),
+        ({"positions": None}, "found NoneType; pass a numpy array"),
+        (
+            {"corner_vertices": SQUARE[1].astype(np.float32)},
+            "corner_vertices: expected a int32 or int64 array of shape (c,), found ndarray of float32 and shape (4,)",
+        ),
+        ({"corner_vertices": SQUARE[1].astype(bool)}, "corner_vertices: expected"),
+        ({"corner_vertices": b"abcd"}, "found bytes of format 'B' and shape (4,)"),
+        ({"corner_vertices": SQUARE[1].reshape(1, 4)}, "of shape (c,), found ndarray of int32 and shape (1, 4)"),
+        (
+            {"corner_vertices": np.array([0, 1, 2, 2**31])},
+            "corner_vertices[3]: expected an index of 32 bits, found 2147483648",
+        ),
+        ({"face_offsets": [0, 4]}, "face_offsets: expected a int32 or int64 array of shape (f + 1,), found list"),
+        ({"corner_triangles": np.zeros((1, 4), np.int32)}, "corner_triangles: expected a int32 or int64 array of shape"),
+        ({"seams": np.zeros((1, 3), np.int32)}, "of shape (s, 2), found ndarray of int32 and shape (1, 3)"),
+        ({"seams": np.array([[0, -(2**40)]])}, "seams[0, 1]: expected an index of 32 bits, found -1099511627776"),
+        (
+            {"seams": np.broadcast_to(np.int32(0), (2**33, 2))},
+            "seams: expected at most 2147483647 rows that fit in memory, found shape (8589934592, 2)",
+        ),
+    ],
+)
+@pytest.mark.parametrize("call", [native.unwrap, native.submit_unwrap])
+def test_wrong_arrays_are_named(call, change, message):
+    arguments = dict(zip(("positions", "corner_vertices", "face_offsets"), SQUARE, strict=True)) | change
+    with pytest.raises(native.InvalidArgumentError) as raised:
+        call(**arguments)
+    assert message in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "element"),
+    [
+        ({"corner_vertices": np.array([0, 1, 3, 4], np.int32)}, "corner 3"),
+        ({"corner_vertices": np.array([0, -1, 3, 2], np.int32)}, "vertex -1"),
+        ({"face_offsets": np.array([0, 2, 4], np.int32)}, "face 0"),
+        ({"face_offsets": np.array([0, 5], np.int32)}, "5"),
+        ({"face_offsets": np.array([], np.int32)}, "offsets"),
+        ({"corner_triangles": np.array([[0, 1, 2], [0, 2, 9]], np.int32)}, "triangle 1"),
+        ({"seams": np.array([[0, 1], [1, 7]], np.int32)}, "seam 1"),
+        ({"positions": np.full((4, 3), np.nan)}, "finite"),
+    ],
+)
+def test_wrong_meshes_are_named(change, element):
+    arguments = dict(zip(("positions", "corner_vertices", "face_offsets"), SQUARE, strict=True)) | change
+    with pytest.raises(native.InvalidMeshError, match=element):
+        native.unwrap(**arguments)
+    job = native.submit_unwrap(**arguments)
+    for _ in range(2):
+        with pytest.raises(native.InvalidMeshError, match=element):
+            job.result()
+    assert job.is_finished() and not job.is_cancelled()
+
+
+def test_the_arrays_are_copied_before_the_call_returns(hill):
+    expected = arrays(native.unwrap(*hill))
+    scratch = [a.copy() for a in hill]
+    job = native.submit_unwrap(*scratch)
+    for a in scratch:
+        a.fill(0)
+    assert_array_equal(arrays(job.result())[0], expected[0])
+
+
+def test_exceptions_are_one_tree():
+    kinds = [native.InvalidMeshError, native.InvalidArgumentError, native.Cancelled, native.InternalError]
+    assert issubclass(native.BleUnwrapError, Exception)
+    for kind in kinds:
+        assert kind.__bases__ == (native.BleUnwrapError,) and kind.__doc__
+        assert kind.__module__ == "ble_unwrap_native"
+
+
+# Settings -----------------------------------------------------------------------------------------------------------
+
+
+def test_defaults_are_those_of_the_design():
+    found = native.default_settings()
+    expected = {
+        "preset": "default",
+        "stretch_limit": 1.1,
+        "holes": "keep",
+        "geodesics": "fast_marching",
+        "landmark_fraction": 0.01,
+        "landmark_min": 48,
+        "landmark_max": 160,
+        "model": "default",
+        "relaxation": 1.6,
+        "max_sweeps": 60,
+        "tolerance": 1e-5,
+        "update": "serial",
+        "initial": "mds",
+        "stretch_solver": "newton",
+        "margin": 4.0,
+        "texture_size": (2048, 2048),
+        "rotation": "any",
+        "threads": 0,
+    }
+    assert {key: found[key] for key in expected} == expected
+    paper = native.default_settings("paper")
+    assert paper.keys() == found.keys()
+    expected = {"preset": "paper", "model": "paper", "holes": "cut", "stretch_solver": "line_search", "initial": "random"}
+    assert {key: paper[key] for key in expected} == expected
+    assert paper["landmark_max"] is None and paper["margin"] == 2 and paper["texture_size"] == (1024, 1024)
+
+
+@pytest.mark.parametrize("preset", ["default", "paper"])
+def test_settings_go_round(hill, preset):
+    all_of_them = native.default_settings(preset)
+    spelled = arrays(native.unwrap(*hill, **all_of_them))
+    named = arrays(native.unwrap(*hill, preset=preset))
+    assert_array_equal(spelled[0], named[0])
+    assert_array_equal(spelled[1], named[1])
+
+
+def test_a_given_setting_beats_the_preset(ball):
+    strict = native.unwrap(*ball, stretch_limit=1.02).report
+    loose = native.unwrap(*ball, stretch_limit=1.3).report
+    assert strict["charts"] > loose["charts"]
+    assert strict["l2_worst_chart"] <= 1.02 + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("stretch_limit", 1, "stretch_limit: expected a number above 1 and at most 1000; found 1"),
+        ("stretch_limit", float("nan"), "found nan"),
+        ("stretch_limit", "1.1", "found '1.1'"),
+        ("weld", "yes", "weld: expected True or False; found 'yes'"),
+        ("seed", -1, "seed: expected a whole number from 0 to 18446744073709551615; found -1"),
+        ("seed", 1.5, "found 1.5"),
+        ("seed", True, "found True"),
+        ("holes", "fill", "holes: expected 'keep' or 'cut'; found 'fill'"),
+        ("model", 3, "model: expected 'default', 'paper' or 'isomap'; found 3"),
+        ("preset", "best", "preset: expected 'default' or 'paper'; found 'best'"),
+        ("kernel_width", 0, "or None for the model's own; found 0"),
+        ("landmark_min", 3, "landmark_min: expected a whole number from 4 to 100000; found 3"),
+        ("landmark_max", 1, "or None for no limit; found 1"),
+        ("relaxation", 2, "relaxation: expected a number above 0 and below 2; found 2"),
+        ("margin", -0.5, "margin: expected a number at least 0 and at most 1024; found -0.5"),
+        ("texture_size", 0, "texture_size: expected a whole number from 16 to"),
+        ("texture_size", (512, 0), "texels, or a pair of them; found 0"),
+        ("texture_size", (1, 2, 3), "found (1, 2, 3)"),
+        ("threads", 5000, "threads: expected a whole number from 0 to 1024; found 5000"),
+    ],
+)
+def test_wrong_settings_are_named(square, name, value, message):
+    with pytest.raises(native.InvalidArgumentError) as raised:
+        native.unwrap(*square, **{name: value})
+    assert message in str(raised.value)
+
+
+def test_unknown_settings_are_named_with_near_ones(square):
+    with pytest.raises(native.InvalidArgumentError) as raised:
+        native.unwrap(*square, strech_limit=1.2)
+    assert str(raised.value) == "unwrap() has no setting 'strech_limit'; did you mean 'stretch_limit'?"
+    with pytest.raises(native.InvalidArgumentError, match="the settings are preset, stretch_limit, .*, threads"):
+        native.unwrap(*square, zzz=1)
+    with pytest.raises(native.InvalidArgumentError, match=r"pack\(\) has no setting 'stretch_limit'"):
+        native.pack(np.zeros((0, 2)), np.zeros((0, 3), np.int32), np.zeros(0, np.int32), stretch_limit=1.2)
+    with pytest.raises(native.InvalidArgumentError, match="preset: expected 'default' or 'paper'"):
+        native.default_settings("artist")
+
+
+def test_settings_that_contradict_each_other_are_named(square):
+    with pytest.raises(native.InvalidArgumentError, match="landmark_max"):
+        native.unwrap(*square, landmark_min=100, landmark_max=50)
+
+
+# Threads and jobs ---------------------------------------------------------------------------------------------------
+
+
+def test_other_python_threads_run_meanwhile(large_ball):
+    ticks, stop = [], threading.Event()
+
+    def tick():
+        while not stop.wait(0.002):
+            ticks.append(time.perf_counter())
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    start = time.perf_counter()
+    native.unwrap(*large_ball)
+    seconds = time.perf_counter() - start
+    stop.set()
+    thread.join()
+    within = [t for t in ticks if start < t < start + seconds]
+    # One tick every 2 ms if the interpreter is free; a loaded machine gets a tenth of that.
+    assert len(within) > 50 * seconds, f"{len(within)} ticks in {seconds:.2f} s"
+    assert max(np.diff([start, *within, start + seconds])) < 0.5 * seconds + 0.2
+
+
+def test_a_job_reports_progress_that_only_rises(large_ball):
+    job = native.submit_unwrap(*large_ball)
+    seen, stages = [job.progress()], set()
+    while not job.wait(0.005):
+        seen.append(job.progress())
+        stages.add(job.stage())
+    assert seen == sorted(seen) and 0 <= seen[0] and seen[-1] <= 1
+    assert len(set(seen)) > 3, f"progress stood still: {set(seen)}"
+    assert len(stages) > 1 and all(stages)
+    assert job.progress() == 1 and job.stage() == "done"
+    assert job.is_finished() and not job.is_cancelled()
+    assert job.result() is job.result()
+    assert isinstance(job.result(), native.Atlas)
+    assert "finished" in repr(job)
+
+
+def test_submit_gives_what_unwrap_gives(ball):
+    expected = arrays(native.unwrap(*ball))
+    assert_array_equal(arrays(native.submit_unwrap(*ball).result())[0], expected[0])
+
+
+def test_cancel_before(large_ball):
+    job = native.Job()
+    job.cancel()
+    assert job.is_cancelled() and not job.is_finished()
+    start = time.perf_counter()
+    with pytest.raises(native.Cancelled, match="cancelled"):
+        native.unwrap(*large_ball, job=job)
+    assert time.perf_counter() - start < 1
+    assert job.is_finished()
+
+
+def test_cancel_comes_before_the_mesh_but_after_the_arguments(square):
+    positions, _corners, offsets = square
+
+    def cancelled():
+        job = native.Job()
+        job.cancel()
+        return job
+
+    wrong = np.array([0, 1, 2, 99], np.int32)
+    with pytest.raises(native.Cancelled):
+        native.unwrap(positions, wrong, offsets, job=cancelled())
+    with pytest.raises(native.InvalidArgumentError, match="positions"):
+        native.unwrap(positions[:, :2], wrong, offsets, job=cancelled())
+    with pytest.raises(native.InvalidArgumentError, match="seed"):
+        native.unwrap(positions, wrong, offsets, job=cancelled(), seed=-1)
+
+
+def test_cancel_during(large_ball):
+    job = native.submit_unwrap(*large_ball)
+    while job.progress() < 0.03 and not job.is_finished():
+        time.sleep(0.001)
+    asked = time.perf_counter()
+    job.cancel()
+    assert job.wait(10), "still running ten seconds after cancel"
+    latency = time.perf_counter() - asked
+    with pytest.raises(native.Cancelled, match="cancelled"):
+        job.result()
+    # The promise is a tenth of a second on a free machine.
+    assert latency < 1, f"took {latency:.2f} s to stop"
+    assert "failed" in repr(job)
+
+
+def test_cancel_from_another_thread(large_ball):
+    job = native.Job()
+    threading.Timer(0.05, job.cancel).start()
+    with pytest.raises(native.Cancelled):
+        native.unwrap(*large_ball, job=job)
+
+
+def test_cancel_after(square):
+    job = native.submit_unwrap(*square)
+    atlas = job.result()
+    job.cancel()
+    assert job.is_cancelled() and job.is_finished() and job.progress() == 1
+    assert job.result() is atlas
+
+
+def test_a_job_serves_one_call(square):
+    job = native.Job()
+    atlas = native.unwrap(*square, job=job)
+    assert job.result() is atlas
+    with pytest.raises(native.InvalidArgumentError, match="job: expected a new Job, found one that has served a call"):
+        native.unwrap(*square, job=job)
+    assert native.submit_unwrap(*square, job=(given := native.Job())) is given
+
+
+def test_a_job_without_a_call():
+    job = native.Job()
+    assert (job.progress(), job.stage(), job.is_finished(), job.is_cancelled()) == (0, "waiting", False, False)
+    assert job.wait() is False
+    with pytest.raises(native.InvalidArgumentError, match="never given to a call"):
+        job.result()
+    with pytest.raises(native.InvalidArgumentError, match="timeout: expected seconds"):
+        job.wait(-1)
+    with pytest.raises(native.InvalidArgumentError, match="timeout: expected seconds"):
+        job.wait(float("nan"))
+
+
+def test_wait_with_a_timeout_returns_in_time(large_ball):
+    job = native.submit_unwrap(*large_ball)
+    start = time.perf_counter()
+    assert job.wait(0) is job.is_finished() or job.is_finished()
+    job.wait(0.05)
+    assert time.perf_counter() - start < 1
+    assert job.wait(float("inf")) is True
+
+
+def test_many_threads_ask_for_one_result(hill):
+    job = native.submit_unwrap(*hill)
+    found = []
+    threads = [threading.Thread(target=lambda: found.append(job.result())) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == 8 and all(atlas is found[0] for atlas in found)
+
+
+def test_a_dropped_job_stops(large_ball):
+    """Nobody waits for it; the interpreter must be able to end while it winds down."""
+    for _ in range(3):
+        native.submit_unwrap(*large_ball)
+    gc.collect()
+
+
+def run_python(code, **environment):
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONPATH": str(HERE), **environment},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+
+
+def test_the_interpreter_may_end_while_a_job_runs():
+    code = "import conftest, ble_unwrap_native as n; job = n.submit_unwrap(*conftest.sphere(128, 128)); print('end')"
+    done = run_python(code)
+    assert (done.returncode, done.stdout) == (0, "end\n"), done.stderr
+
+
+def test_ctrl_c_interrupts():
+    code = """
+import _thread, threading, time, conftest, ble_unwrap_native as n
+job = n.Job()
+threading.Timer(0.1, _thread.interrupt_main).start()
+start = time.perf_counter()
+try:
+    n.unwrap(*conftest.sphere(256, 256), job=job)
+except KeyboardInterrupt:
+    print("interrupted", job.is_cancelled(), job.is_finished())
+"""
+    done = run_python(code)
+    assert done.stdout == "interrupted True True\n", done.stderr
+
+
+HASH = """
+import hashlib, conftest, numpy as np, ble_unwrap_native as n
+digest = hashlib.sha256()
+bump = lambda x, y: 0.4 * np.sin(7 * x) * np.cos(5 * y)
+for mesh, settings in [
+    (conftest.sphere(64, 48), {}),
+    (conftest.grid(40, 40, bump), {}),
+    (conftest.grid(12, 12, bump), {"preset": "paper", "seed": 5}),
+]:
+    atlas = n.unwrap(*mesh, **settings)
+    digest.update(bytes(atlas.uv))
+    digest.update(bytes(atlas.chart))
+print(digest.hexdigest())
+"""
+
+
+def test_the_same_bytes_for_any_number_of_threads():
+    found = {}
+    for threads in ("1", "2", "8"):
+        done = run_python(HASH, RAYON_NUM_THREADS=threads)
+        assert done.returncode == 0, done.stderr
+        found[threads] = done.stdout
+    assert len(set(found.values())) == 1 and len(found["1"]) == 65, found
+
+
+def test_the_same_bytes_for_any_threads_setting(ball):
+    results = [arrays(native.unwrap(*ball, threads=threads)) for threads in (0, 1, 2, 8)]
+    for uv, chart in results[1:]:
+        assert_array_equal(uv, results[0][0])
+        assert_array_equal(chart, results[0][1])
