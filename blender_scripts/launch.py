@@ -73,7 +73,10 @@ class BpyModule:
 
     def _works(self):
         done = subprocess.run(
-            [self.python, "-c", "import bpy; print(bpy.app.version_string)"], capture_output=True, text=True, check=False
+            [self.python, "-c", "import bpy; print(bpy.app.version_string)"],
+            capture_output=True,
+            text=True,
+            check=False,
         )
         self._error = done.stderr.strip()
         return done.returncode == 0

@@ -15,7 +15,16 @@ def main(arguments):
     sys.path.append(os.environ["BLE_PYTEST_LIBRARY"])
     import pytest
 
-    options = ["--rootdir", str(HERE), "--confcutdir", str(HERE), "-c", str(HERE / "pytest.ini"), "-p", "no:cacheprovider"]
+    options = [
+        "--rootdir",
+        str(HERE),
+        "--confcutdir",
+        str(HERE),
+        "-c",
+        str(HERE / "pytest.ini"),
+        "-p",
+        "no:cacheprovider",
+    ]
     return int(pytest.main([*options, *arguments, str(HERE)]))
 
 

@@ -78,7 +78,7 @@ def test_several_objects_share_one_atlas_and_one_density(addon):
         assert_good(obj)
     assert overlaps(addon, first, second) == 0
     density = [
-        triangle_areas(obj, uvs(obj)).sum() / (surface_areas(obj).sum() * obj.scale.x ** 2) for obj in (first, second)
+        triangle_areas(obj, uvs(obj)).sum() / (surface_areas(obj).sum() * obj.scale.x**2) for obj in (first, second)
     ]
     assert density[1] == pytest.approx(density[0], rel=0.05)
 
@@ -108,6 +108,7 @@ def test_linked_duplicates_are_unwrapped_once(addon):
     first = cube("A")
     second = first.copy()
     bpy.context.collection.objects.link(second)
+    bpy.context.view_layer.update()
     select(first, second)
     assert len(addon("mesh_bridge").target_objects(bpy.context)) == 1
     assert unwrap() == {"FINISHED"}
@@ -122,6 +123,7 @@ def test_copies_of_the_mesh_are_left_alone(mode):
     copy = obj.copy()
     copy.data = obj.data.copy()
     bpy.context.collection.objects.link(copy)
+    bpy.context.view_layer.update()
     select(obj)
     before, seams = uvs(copy).copy(), fingerprint(copy)
     if mode == "EDIT":
@@ -445,7 +447,8 @@ def test_job_reports_progress_and_cancels(addon):
 def test_same_uvs_for_any_number_of_threads(addon):
     obj = sphere(cells=12)
     results = [
-        addon("task").UnwrapTask([obj], {"preset": "DEFAULT"}, threads=threads).run().uv.tobytes() for threads in (1, 2, 3)
+        addon("task").UnwrapTask([obj], {"preset": "DEFAULT"}, threads=threads).run().uv.tobytes()
+        for threads in (1, 2, 3)
     ]
     assert results[0] == results[1] == results[2]
 
