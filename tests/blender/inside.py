@@ -7,7 +7,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent.parent / "blender_scripts"))
 
-import addon_loader
+import addon_loader  # noqa: E402
 
 
 def main(arguments):
