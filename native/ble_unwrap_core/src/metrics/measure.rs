@@ -87,6 +87,7 @@ pub struct Measures {
     /// Length of the seams in units of the mesh.
     pub seam_length_absolute: f64,
     /// Covered share of the unit square; for a layout outside it, of its bounding square.
+    /// Area covered twice is taken off once a pair; meaningless where overlaps are not complete.
     pub packing_efficiency: f64,
     /// Least distance between two islands in texels; the search limit (eight, or twice the margin)
     /// if it is more, 0 if boundaries cross.
@@ -182,7 +183,7 @@ pub fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Cancelled
     let covered = (mapped.iter().map(|&f| faces[f].uv_double_area.abs()).sum::<f64>() * 0.5 - common.area).max(0.0);
     let inside = (0..2).all(|k| uv_box[0][k] >= -RANGE_SLACK && uv_box[1][k] <= 1.0 + RANGE_SLACK);
     let whole = if inside { aspect[0] * aspect[1] } else { longest_extent.max(1e-30).powi(2) };
-    out.packing_efficiency = covered / whole;
+    out.packing_efficiency = if common.complete { covered / whole } else { (covered / whole).min(1.0) };
 
     let texels = mesh.texture().texels();
     let segments: Vec<OwnedSegment> = topology

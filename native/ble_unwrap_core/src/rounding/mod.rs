@@ -28,12 +28,12 @@ const BOUNDARY_REACH: f64 = 1.0 / 64.0;
 const INNER_REACH: f64 = 0.5;
 /// Rounds; the reach doubles every second one, from two grid steps to 8192.
 const ROUNDS: u32 = 24;
-/// Rounds in which triangles that are merely thin are looked after: up to eight grid steps, more
-/// than `HEIGHT` asks for.
+/// Rounds in which triangles that are merely thin are looked after, with a reach of twice `HEIGHT` or
+/// more from the start.
 const THIN_ROUNDS: u32 = 6;
 /// From this round on the neighbours of a turned triangle's vertices move as well.
 const NEIGHBOUR_ROUND: u32 = 8;
-/// Moves tried at most, for turned and for thin triangles each. About 10 µs a try.
+/// Moves tried at most, for turned and for thin triangles each, besides two a vertex. About 5 µs a try.
 const TRIES: usize = 50_000;
 
 /// What the rounding has to know besides the chart.
@@ -143,7 +143,7 @@ impl Mender<'_> {
         let largest = self.uv.iter().flatten().fold(0.0f32, |a, x| a.max(x.abs()));
         // At least the pitch of the grid at the largest coordinate.
         let pitch = f64::from(largest) * f64::from(f32::EPSILON);
-        let mut tries = [TRIES; 2];
+        let mut tries = [TRIES + 2 * self.mesh.vertex_count(); 2];
         for round in 0..ROUNDS {
             let thin_too = round < THIN_ROUNDS && !self.thin.is_empty() && tries[1] > 0;
             if self.turned.is_empty() && !thin_too {
@@ -152,7 +152,8 @@ impl Mender<'_> {
             let reach = pitch * f64::from(2u32 << (round / 2));
             let mut touched: Vec<FaceId> = self.turned.iter().chain(&self.thin).copied().collect();
             let lists = [self.turned.clone(), if thin_too { self.thin.clone() } else { Vec::new() }];
-            for (list, tries) in lists.iter().zip(&mut tries) {
+            let reaches = [reach, reach.max(2.0 * HEIGHT)];
+            for ((list, reach), tries) in lists.iter().zip(reaches).zip(&mut tries) {
                 for v in self.vertices_of(list, round >= NEIGHBOUR_ROUND) {
                     if *tries == 0 {
                         break;

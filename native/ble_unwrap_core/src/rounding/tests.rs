@@ -3,6 +3,8 @@
 use nalgebra::Point3;
 
 use super::*;
+use crate::metrics::{Texture, UvMesh};
+use crate::{Progress, verify};
 
 const ROUNDING: Rounding = Rounding { texel: [1.0 / 2048.0; 2], diagonal: 1.5 };
 
@@ -46,6 +48,14 @@ fn broken_by_plain_rounding(mesh: &TriMesh, uv: &[Point2<f64>]) -> usize {
         .count()
 }
 
+/// The certificate of a chart on its own.
+fn is_injective(mesh: &TriMesh, uv: &[[f32; 2]]) -> bool {
+    let t: Vec<[u32; 3]> = mesh.triangles().iter().map(|t| t.map(|v| v.index() as u32)).collect();
+    let texture = Texture::square(2048, 4.0);
+    let soup = UvMesh::new(mesh.positions(), &t, uv, &t, &[], texture).expect("valid arrays");
+    verify(&soup, &[], &Progress::new()).expect("not cancelled").is_valid()
+}
+
 fn all_positive(mesh: &TriMesh, uv: &[[f32; 2]]) -> bool {
     mesh.triangles().iter().all(|t| {
         let [a, b, c] = t.map(|v| uv[v.index()]);
@@ -68,7 +78,7 @@ fn needles_that_collapse_are_mended() {
         let uv = placed(&uv, 0.45, [0.52, 0.51]);
         assert!(broken_by_plain_rounding(&mesh, &uv) > 10);
         let r = round_to_f32(&mesh, &uv, &ROUNDING).expect("mendable");
-        assert!(all_positive(&mesh, &r.uv) && r.moved > 0);
+        assert!(all_positive(&mesh, &r.uv) && is_injective(&mesh, &r.uv) && r.moved > 0);
         for (v, (a, b)) in mesh.vertices().zip(r.uv.iter().zip(&uv)) {
             let d = (f64::from(a[0]) - b.x).abs().max((f64::from(a[1]) - b.y).abs());
             assert!(d <= if mesh.is_boundary_vertex(v) { BOUNDARY_REACH } else { INNER_REACH } / 2048.0);
@@ -94,7 +104,7 @@ fn a_tiny_chart_with_needles_is_mended() {
     let uv = placed(&uv, 1e-5, [0.777_777, 0.654_321]);
     assert!(broken_by_plain_rounding(&mesh, &uv) > 10);
     let r = round_to_f32(&mesh, &uv, &ROUNDING).expect("mendable");
-    assert!(all_positive(&mesh, &r.uv));
+    assert!(all_positive(&mesh, &r.uv) && is_injective(&mesh, &r.uv));
     assert_eq!(round_to_f32(&mesh, &uv, &ROUNDING).expect("mendable"), r);
 }
 
@@ -118,7 +128,7 @@ fn results_stay_in_the_unit_square() {
     for shift in [[0.0, 0.0], [1.0 - 1e-4, 1.0 - 1e-4]] {
         let uv: Vec<_> = placed(&uv, 1e-4, shift).iter().map(|p| Point2::new(p.x.min(1.0), p.y.min(1.0))).collect();
         let r = round_to_f32(&mesh, &uv, &ROUNDING).expect("mendable");
-        assert!(all_positive(&mesh, &r.uv));
+        assert!(all_positive(&mesh, &r.uv) && is_injective(&mesh, &r.uv));
         assert!(r.uv.iter().flatten().all(|x| (0.0..=1.0).contains(x)));
     }
 }

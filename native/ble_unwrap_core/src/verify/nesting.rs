@@ -9,7 +9,7 @@ use super::{Defect, Point, orientation};
 /// Charts with more boundary edges than this get a tree of their own.
 const LINEAR: usize = 32;
 /// Edges and charts that a chunk of loops looks at before it gives up.
-const CHUNK_BUDGET: u64 = 20_000_000;
+const CHUNK_BUDGET: u64 = 4_000_000;
 
 /// Loops inside the filled area of other charts.
 pub(super) struct Nested {
@@ -45,7 +45,7 @@ pub(super) fn nested(boundary: &Boundary, progress: &Progress) -> Result<Nested,
     let mut out = Nested { nested: Defect::default(), charts: Vec::new(), complete: true };
     // Work done so far. Ten nanoseconds each: seconds at worst.
     let mut state = 0u64;
-    let total_budget = 64 * boundary.edges.len() as u64 + 300_000_000;
+    let total_budget = 64 * boundary.edges.len() as u64 + 100_000_000;
     in_batches(
         boundary.loops.len(),
         progress,
@@ -71,6 +71,8 @@ pub(super) fn nested(boundary: &Boundary, progress: &Progress) -> Result<Nested,
                     }
                 }
             }
+            found.1.sort_unstable();
+            found.1.dedup();
             (found, work)
         },
         |total, ((defect, charts), work)| {

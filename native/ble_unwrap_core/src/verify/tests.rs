@@ -237,3 +237,19 @@ fn valid_exactly_where_no_two_triangles_overlap() {
     }
     assert!(good > 20 && bad > 20, "{good} {bad}");
 }
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let mut soup = spiral(3.0, 0.05);
+    for i in 0..40 {
+        soup.square(10 + i, [0.02 * f64::from(i), 0.3], 0.05);
+    }
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| soup.verify())
+    };
+    let one = with(1);
+    assert!(one.crossings_between.count > 50 && one.crossings_inside.count > 1, "{one:?}");
+    assert_eq!(one, with(2));
+    assert_eq!(one, with(8));
+}

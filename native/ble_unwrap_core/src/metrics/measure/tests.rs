@@ -206,3 +206,17 @@ fn the_worst_chart_is_named_specks_aside() {
     assert_eq!((m.charts, m.worst_chart), (7, Some(2)));
     assert!(m.per_chart[6].l2 > 1.5 && m.per_chart[6].label == 17);
 }
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    // Folded and wavy, so that every figure is far from trivial.
+    let l = Layout::grid(60, |x, y| [0.5 + 0.4 * (7.0 * x).sin(), 0.9 * y + 0.05 * (9.0 * x).cos()]);
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| l.measure(Texture::square(256, 2.0)))
+    };
+    let one = with(1);
+    assert!(one.overlaps > 1000 && one.flips > 100);
+    assert_eq!(one, with(2));
+    assert_eq!(one, with(8));
+}
