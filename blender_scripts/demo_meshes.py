@@ -15,6 +15,7 @@ def add_mesh(name, positions, faces):
     mesh.update()
     obj = bpy.data.objects.new(name, mesh)
     bpy.context.collection.objects.link(obj)
+    bpy.context.view_layer.update()
     for other in bpy.context.view_layer.objects:
         other.select_set(False)
     obj.select_set(True)
