@@ -29,12 +29,11 @@ pub mod metrics;
 pub mod packing;
 mod pipeline;
 mod progress;
-pub mod standalone;
-pub mod stretch;
 mod report;
 pub mod rounding;
 pub mod segmentation;
 mod settings;
+pub mod standalone;
 pub mod stretch;
 mod verify;
 
