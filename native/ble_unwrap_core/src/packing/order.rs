@@ -24,10 +24,10 @@ enum Size {
 /// one is within 3 % of another, the best of all 2 to 4 % above each).
 const PORTFOLIO: [(Goal, Size); 8] = [
     (Goal::Middle, Size::Area),
+    (Goal::Middle, Size::Extent),
     (Goal::Middle, Size::Box),
     (Goal::Top, Size::Area),
     (Goal::Centre, Size::Extent),
-    (Goal::Middle, Size::Extent),
     (Goal::Top, Size::Extent),
     (Goal::Centre, Size::Area),
     (Goal::Top, Size::Box),
