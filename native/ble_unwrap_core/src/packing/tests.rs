@@ -37,7 +37,11 @@ fn l_shape(size: f64, arm: f64) -> Chart {
 }
 
 fn annulus(outer: f64, inner: f64, n: u32) -> Chart {
-    let ring = |r: f64| (0..n).map(move |k| Point2::new(r * (TAU * f64::from(k) / f64::from(n)).cos(), r * (TAU * f64::from(k) / f64::from(n)).sin()));
+    let ring = |r: f64| {
+        (0..n).map(move |k| {
+            Point2::new(r * (TAU * f64::from(k) / f64::from(n)).cos(), r * (TAU * f64::from(k) / f64::from(n)).sin())
+        })
+    };
     let triangles = (0..n).flat_map(|k| {
         let next = (k + 1) % n;
         [[k, next, n + k], [next, n + next, n + k]]
@@ -47,7 +51,8 @@ fn annulus(outer: f64, inner: f64, n: u32) -> Chart {
 
 /// A star-shaped blob of about unit radius.
 fn blob(numbers: &mut Numbers, radius: f64) -> Chart {
-    let waves: Vec<(f64, f64)> = (2..7).map(|k| (0.5 * (numbers.next() - 0.5) / f64::from(k), TAU * numbers.next())).collect();
+    let waves: Vec<(f64, f64)> =
+        (2..7).map(|k| (0.5 * (numbers.next() - 0.5) / f64::from(k), TAU * numbers.next())).collect();
     let n = 40;
     let mut points: Vec<_> = (0..n)
         .map(|k| {
@@ -154,14 +159,21 @@ fn check(charts: &[Chart], settings: &PackSettings, packed: &Packed) -> f64 {
     let all: Vec<_> = charts.iter().enumerate().map(|(k, c)| final_triangles(packed, k, c)).collect();
     let boxes: Vec<_> = all
         .iter()
-        .map(|ts| ts.iter().flatten().fold([f64::MAX, f64::MAX, f64::MIN, f64::MIN], |b, p| [b[0].min(p.x), b[1].min(p.y), b[2].max(p.x), b[3].max(p.y)]))
+        .map(|ts| {
+            ts.iter().flatten().fold([f64::MAX, f64::MAX, f64::MIN, f64::MIN], |b, p| {
+                [b[0].min(p.x), b[1].min(p.y), b[2].max(p.x), b[3].max(p.y)]
+            })
+        })
         .collect();
     let mut least = f64::INFINITY;
     for (i, b) in boxes.iter().enumerate() {
         assert!(b.iter().all(|v| v.is_finite()), "chart {i} is finite");
         let half = 0.5 * margin;
         assert!(b[0] >= half && b[1] >= half, "chart {i} at {b:?} is half a margin from the border");
-        assert!(b[2] <= f64::from(settings.width) - half && b[3] <= f64::from(settings.height) - half, "chart {i} at {b:?}");
+        assert!(
+            b[2] <= f64::from(settings.width) - half && b[3] <= f64::from(settings.height) - half,
+            "chart {i} at {b:?}"
+        );
         let pose = &packed.poses[i];
         assert!((pose.cos.hypot(pose.sin) - 1.0).abs() < 1e-12 && pose.scale > 0.0, "a similarity without mirroring");
         for j in 0..i {
@@ -229,7 +241,8 @@ fn holes_are_used() {
     let packed = packed(&charts, &settings);
     check(&charts, &settings, &packed);
     let middle = packed.poses[0].offset;
-    let within = (1..charts.len()).filter(|&k| (packed.poses[k].offset - middle).norm() < 9.0 * packed.texels_per_unit).count();
+    let within =
+        (1..charts.len()).filter(|&k| (packed.poses[k].offset - middle).norm() < 9.0 * packed.texels_per_unit).count();
     assert!(within >= 12, "{within} discs in the ring");
 }
 
@@ -249,8 +262,9 @@ fn the_same_for_any_number_of_threads() {
 #[test]
 fn orientation_and_size_are_kept() {
     let charts = mixture(12, 8);
-    for rotation in [Rotation::Any, Rotation::Quarter, Rotation::None] {
-        let packed = packed(&charts, &PackSettings { rotation, ..square(512, 1.0) });
+    let rotations = [Rotation::Any, Rotation::Quarter, Rotation::None];
+    for (rotation, width) in rotations.into_iter().flat_map(|r| [(r, 512), (r, 700)]) {
+        let packed = packed(&charts, &PackSettings { rotation, width, ..square(512, 1.0) });
         assert_eq!(packed.specks, 0);
         for (k, (points, triangles)) in charts.iter().enumerate() {
             let area = |p: [Point2<f64>; 3]| (p[1] - p[0]).perp(&(p[2] - p[0]));
@@ -329,7 +343,8 @@ fn any_unit_of_length() {
     let settings = square(256, 2.0);
     let efficiency = packed(&charts, &settings).efficiency;
     for unit in [1e-140, 1e-6, 1e5, 1e140] {
-        let scaled: Vec<Chart> = charts.iter().map(|(p, t)| (p.iter().map(|p| p * unit).collect(), t.clone())).collect();
+        let scaled: Vec<Chart> =
+            charts.iter().map(|(p, t)| (p.iter().map(|p| p * unit).collect(), t.clone())).collect();
         let packed = packed(&scaled, &settings);
         check(&scaled, &settings, &packed);
         assert!((packed.efficiency - efficiency).abs() < 0.05, "{} for {unit}", packed.efficiency);
@@ -344,7 +359,9 @@ fn nothing_points_and_wires_are_packed() {
     let empty: Chart = (vec![at(0.0)], vec![]);
     let point: Chart = (vec![at(2.0)], vec![[0, 0, 0]]);
     let wire: Chart = (vec![at(0.0), at(3.0), at(5.0)], vec![[0, 1, 2]]);
-    for charts in [vec![empty.clone()], vec![point.clone(); 5], vec![wire.clone()], vec![empty, point, wire, regular(5, 1.0)]] {
+    for charts in
+        [vec![empty.clone()], vec![point.clone(); 5], vec![wire.clone()], vec![empty, point, wire, regular(5, 1.0)]]
+    {
         let packed = packed(&charts, &settings);
         let real: Vec<usize> = (0..charts.len()).filter(|&k| !charts[k].1.is_empty()).collect();
         for &k in &real {
@@ -352,14 +369,17 @@ fn nothing_points_and_wires_are_packed() {
                 assert!((1.0..=63.0).contains(&p.x) && (1.0..=63.0).contains(&p.y));
             }
         }
-        assert!(packed.poses.len() == charts.len() && packed.poses.iter().all(|p| p.scale.is_finite() && p.scale > 0.0));
+        assert!(
+            packed.poses.len() == charts.len() && packed.poses.iter().all(|p| p.scale.is_finite() && p.scale > 0.0)
+        );
     }
 }
 
 #[test]
 fn errors_say_what_to_do() {
     let charts = mixture(30, 1);
-    let fails = |settings: PackSettings| pack(&items(&charts), &settings, &Progress::new()).expect_err("cannot be packed");
+    let fails =
+        |settings: PackSettings| pack(&items(&charts), &settings, &Progress::new()).expect_err("cannot be packed");
     assert_eq!(fails(PackSettings { width: 0, ..square(64, 1.0) }), PackError::TextureSize { width: 0, height: 64 });
     assert!(matches!(fails(square(PackSettings::LARGEST_SIZE + 1, 1.0)), PackError::TextureSize { .. }));
     for margin in [-1.0, f64::NAN, f64::INFINITY] {
@@ -385,8 +405,7 @@ fn stops_when_cancelled() {
 fn one_chart_of_many_triangles() {
     // 80,000 triangles; only the boundary is rasterised, a few hundred edges.
     let n = 200u32;
-    let points: Vec<_> =
-        (0..=n).flat_map(|y| (0..=n).map(move |x| Point2::new(f64::from(x), f64::from(y)))).collect();
+    let points: Vec<_> = (0..=n).flat_map(|y| (0..=n).map(move |x| Point2::new(f64::from(x), f64::from(y)))).collect();
     let corner = |x: u32, y: u32| y * (n + 1) + x;
     let triangles: Vec<_> = (0..n)
         .flat_map(|y| (0..n).map(move |x| (x, y)))
