@@ -31,7 +31,7 @@ def new_scene():
 
 def load(path):
     """Replaces the scene by a file's contents and returns its mesh objects, in order of name."""
-    path = Path(path)
+    path = Path(path).absolute()  # Blender takes relative paths from $PWD, not from the working directory
     kind = file_format(path)
     if kind not in INPUT_FORMATS:
         raise AssetError(f"cannot read '.{kind}' files; known are {', '.join(INPUT_FORMATS)}")
@@ -72,7 +72,7 @@ def _import(path, kind):
 
 def save(path):
     """Writes the scene as the format of the file's name: into a directory beside it first, then moved into place."""
-    path = Path(path)
+    path = Path(path).absolute()
     kind = file_format(path)
     if kind not in OUTPUT_FORMATS:
         raise AssetError(f"cannot write '.{kind}' files; known are {', '.join(OUTPUT_FORMATS)}")

@@ -121,7 +121,8 @@ def gather(objects, *, only_selected=False, make_new_map=False):
         corner_base += corner_count
         face_base += face_count
     if not parts:
-        raise MeshError("No faces are selected" if only_selected else "There are no faces to unwrap")
+        chosen = only_selected and any(obj.mode == "EDIT" and obj.data.polygons for obj in objects)
+        raise MeshError("No faces are selected" if chosen else "There are no faces to unwrap")
     if max(vertex_base, corner_base) > np.iinfo(np.int32).max:
         raise MeshError("The selection is too large: more than two thousand million corners")
     positions, corner_vertices, sizes, triangles, seams = (
@@ -316,13 +317,22 @@ def write_uvs(selection, uv, *, make_new_map=False, map_name="UVMap", mark_seams
             else:
                 values = read_array(layer.uv, "vector", np.float32, 2)
                 values[part.source_corners] = uv[part.corners]
-            layer.uv.foreach_set("vector", values.reshape(-1))
+            write_layer(mesh, layer_name, values)
             if mark_seams:
                 mark_chart_borders(mesh, values, part.source_faces)
             mesh.update()
             after = read_array(mesh.uv_layers[layer_name].uv, "vector", np.float32, 2)
             held[part.corners] = after if part.source_corners is None else after[part.source_corners]
     return held
+
+
+def write_layer(mesh, name, values):
+    """Sets all UVs of a map.
+
+    Not through `uv_layers[name].uv`: until 5.0 that writes in place into memory which may be shared with duplicates
+    of the mesh and with the undo history. Attributes are made the mesh's own before they are written.
+    """
+    mesh.attributes[name].data.foreach_set("vector", np.ascontiguousarray(values, np.float32).reshape(-1))
 
 
 def writable_layer(mesh, make_new_map, map_name):

@@ -84,6 +84,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         soft_max=32.0,
         step=50,
         precision=1,
+        subtype="PIXEL",
     )
     rotation: EnumProperty(
         name="Rotation",

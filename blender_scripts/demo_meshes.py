@@ -11,10 +11,11 @@ SCULPT_CELLS = 96  # quads along a side of each of the six patches: 55,296 in al
 def add_mesh(name, positions, faces):
     """A new object in the scene from (n, 3) positions and a list or array of faces; it becomes the active one."""
     mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(np.asarray(positions, float).tolist(), [], np.asarray(faces).tolist())
+    mesh.from_pydata(np.asarray(positions, float).tolist(), [], [list(map(int, face)) for face in faces])
     mesh.update()
     obj = bpy.data.objects.new(name, mesh)
     bpy.context.collection.objects.link(obj)
+    bpy.context.view_layer.update()
     for other in bpy.context.view_layer.objects:
         other.select_set(False)
     obj.select_set(True)

@@ -73,7 +73,10 @@ class BpyModule:
 
     def _works(self):
         done = subprocess.run(
-            [self.python, "-c", "import bpy; print(bpy.app.version_string)"], capture_output=True, text=True, check=False
+            [self.python, "-c", "import bpy; print(bpy.app.version_string)"],
+            capture_output=True,
+            text=True,
+            check=False,
         )
         self._error = done.stderr.strip()
         return done.returncode == 0
@@ -100,9 +103,8 @@ class BlenderProgram:
         self.key = match[0].lower().replace(" ", "-")
 
     def command(self, script, arguments):
-        return [
-            self.path, "--background", "--factory-startup", "--python-exit-code", "9", "--python", script, "--", *arguments,
-        ]  # fmt: skip
+        options = ["--background", "--factory-startup", "--python-exit-code", "9"]
+        return [self.path, *options, "--python", script, "--", *arguments]
 
 
 def find_blender(versions=("5.0", "5.2", "4.2")):

@@ -88,7 +88,7 @@ def place_camera(scene, points, aspect):
     data.angle = FIELD_OF_VIEW
     data.clip_start, data.clip_end = distance / 1000, distance * 100
     camera = bpy.data.objects.new("BLE camera", data)
-    position = (target + (0, 0, distance)) @ frame
+    position = (target + np.array([0.0, 0.0, distance])) @ frame
     camera.matrix_world = mathutils.Matrix(
         [[*frame[:, row], position[row]] for row in range(3)] + [[0.0, 0.0, 0.0, 1.0]]
     )
@@ -183,7 +183,7 @@ def main(argv):
     parser.add_argument("--samples", type=int, default=32, help="light paths a pixel (default: 32)")
     parser.add_argument("--cells", type=int, default=16, help="cells along a side of the grid (default: 16)")
     options = parser.parse_args(argv)
-    if not (16 <= min(options.size) and max(options.size) <= 8192 and 1 <= options.samples <= 4096):
+    if not all(16 <= side <= 8192 for side in options.size) or not 1 <= options.samples <= 4096:
         parser.error("--size must be within 16 and 8192, --samples within 1 and 4096")
     if not 1 <= options.cells <= 64:
         parser.error("--cells must be within 1 and 64")

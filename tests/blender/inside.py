@@ -7,7 +7,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent.parent / "blender_scripts"))
 
-import addon_loader
+import addon_loader  # noqa: E402
 
 
 def main(arguments):
@@ -15,7 +15,16 @@ def main(arguments):
     sys.path.append(os.environ["BLE_PYTEST_LIBRARY"])
     import pytest
 
-    options = ["--rootdir", str(HERE), "--confcutdir", str(HERE), "-c", str(HERE / "pytest.ini"), "-p", "no:cacheprovider"]
+    options = [
+        "--rootdir",
+        str(HERE),
+        "--confcutdir",
+        str(HERE),
+        "-c",
+        str(HERE / "pytest.ini"),
+        "-p",
+        "no:cacheprovider",
+    ]
     return int(pytest.main([*options, *arguments, str(HERE)]))
 
 

@@ -18,7 +18,7 @@ HERE = Path(__file__).resolve().parent
 REPO = HERE.parent.parent
 sys.path.insert(0, str(REPO / "blender_scripts"))
 
-import launch
+import launch  # noqa: E402
 
 DEFAULT_VERSIONS = ("4.2", "5.0", "5.2")
 

@@ -65,6 +65,12 @@ def uvs(obj, name=None):
     return values.reshape(-1, 2)
 
 
+def set_uvs(obj, values):
+    """Sets the UVs of the active map as the add-on must: see mesh_bridge.write_layer."""
+    name = obj.data.uv_layers.active.name
+    obj.data.attributes[name].data.foreach_set("vector", np.asarray(values, np.float32).reshape(-1))
+
+
 def triangle_areas(obj, uv):
     """Signed UV areas of Blender's own triangulation: positive is not flipped."""
     mesh = obj.data

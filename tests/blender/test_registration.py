@@ -44,7 +44,9 @@ def test_presets_are_those_of_the_native_module(addon, preset):
     properties, engine = addon("properties"), addon("engine")
     settings = bpy.context.scene.ble_unwrap
     settings.preset = preset
-    shown = {name: getattr(settings, name) for name in properties.annotations() if name not in properties.BRIDGE_SETTINGS}
+    shown = {
+        name: getattr(settings, name) for name in properties.annotations() if name not in properties.BRIDGE_SETTINGS
+    }
     shown["texture_size"] = tuple(shown["texture_size"])
     ours = engine.native_settings(shown)
     theirs = engine.default_settings(preset)

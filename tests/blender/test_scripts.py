@@ -168,9 +168,7 @@ def test_wrong_usage_is_2(run_script, files, arguments, message):
 def test_missing_library_is_3(run_script, files, tmp_path):
     cube()
     source = files("a.obj")
-    done = run_script(
-        "unwrap.py", source, "-o", "out", environment={"BLENDER_USER_RESOURCES": str(tmp_path / "empty")}
-    )
+    done = run_script("unwrap.py", source, "-o", "out", environment={"BLENDER_USER_RESOURCES": str(tmp_path / "empty")})
     assert done.returncode == 3, done.stdout
     assert "native library" in done.stdout
     assert not (tmp_path / "out").exists()

@@ -14,6 +14,7 @@ from scenes import (
     grid,
     n_gons,
     select,
+    set_uvs,
     sphere,
     surface_areas,
     triangle_areas,
@@ -77,7 +78,7 @@ def test_several_objects_share_one_atlas_and_one_density(addon):
         assert_good(obj)
     assert overlaps(addon, first, second) == 0
     density = [
-        triangle_areas(obj, uvs(obj)).sum() / (surface_areas(obj).sum() * obj.scale.x ** 2) for obj in (first, second)
+        triangle_areas(obj, uvs(obj)).sum() / (surface_areas(obj).sum() * obj.scale.x**2) for obj in (first, second)
     ]
     assert density[1] == pytest.approx(density[0], rel=0.05)
 
@@ -107,10 +108,30 @@ def test_linked_duplicates_are_unwrapped_once(addon):
     first = cube("A")
     second = first.copy()
     bpy.context.collection.objects.link(second)
+    bpy.context.view_layer.update()
     select(first, second)
     assert len(addon("mesh_bridge").target_objects(bpy.context)) == 1
     assert unwrap() == {"FINISHED"}
     assert_good(first)
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_copies_of_the_mesh_are_left_alone(mode):
+    """Blender shares the arrays of copied meshes until one is written: writing must not reach through."""
+    obj = sphere("A")
+    obj.data.uv_layers.new(name="UVMap")
+    copy = obj.copy()
+    copy.data = obj.data.copy()
+    bpy.context.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    select(obj)
+    before, seams = uvs(copy).copy(), fingerprint(copy)
+    if mode == "EDIT":
+        edit(obj)
+    unwrap(mark_seams=True)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert np.array_equal(uvs(copy), before)
+    assert fingerprint(copy) == seams
 
 
 def test_selected_faces_only():
@@ -142,7 +163,7 @@ def test_selection_keeps_its_place_in_the_texture():
     obj = grid(6)
     unwrap()
     values = uvs(obj) * np.float32(0.25) + np.float32((0.5, 0.125))
-    obj.data.uv_layers.active.uv.foreach_set("vector", values.reshape(-1))
+    set_uvs(obj, values)
     edit(obj)
     assert unwrap(use_original_bounds=True, texture_size=(1024, 1024), margin=2.0) == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
@@ -426,7 +447,8 @@ def test_job_reports_progress_and_cancels(addon):
 def test_same_uvs_for_any_number_of_threads(addon):
     obj = sphere(cells=12)
     results = [
-        addon("task").UnwrapTask([obj], {"preset": "DEFAULT"}, threads=threads).run().uv.tobytes() for threads in (1, 2, 3)
+        addon("task").UnwrapTask([obj], {"preset": "DEFAULT"}, threads=threads).run().uv.tobytes()
+        for threads in (1, 2, 3)
     ]
     assert results[0] == results[1] == results[2]
 

@@ -35,7 +35,7 @@ impl RestTriangle {
         let length = [(p[1] - p[0]).norm(), (p[2] - p[1]).norm(), (p[0] - p[2]).norm()];
         let longest = length[0].max(length[1]).max(length[2]);
         let least = unit * 1e-6;
-        if !(longest > least) {
+        if longest <= least || !longest.is_finite() {
             let side = if least > 0.0 { least } else { 1.0 };
             return Self { x1: side, x2: 0.5 * side, y2: 0.75_f64.sqrt() * side };
         }

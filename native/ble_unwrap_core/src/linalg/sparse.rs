@@ -9,6 +9,8 @@ use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side, Spec};
 use thiserror::Error;
 
+use super::vector_state::restore_vector_state;
+
 /// Why a sparse system could not be factored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum SparseError {
@@ -125,13 +127,9 @@ impl SparseCholesky {
     pub fn analyse(pattern: SparsePattern) -> Result<Self, SparseError> {
         let n = pattern.size();
         let a = SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_start, None, &pattern.row);
-        let symbolic = factorize_symbolic_cholesky(
-            a,
-            Side::Upper,
-            SymmetricOrdering::Amd,
-            CholeskySymbolicParams::default(),
-        )
-        .map_err(|_: FaerError| SparseError::TooLarge)?;
+        let symbolic =
+            factorize_symbolic_cholesky(a, Side::Upper, SymmetricOrdering::Amd, CholeskySymbolicParams::default())
+                .map_err(|_: FaerError| SparseError::TooLarge)?;
         let buffer = |req| MemBuffer::try_new(req).map_err(|_| SparseError::TooLarge);
         let factor_scratch = buffer(symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()))?;
         let solve_scratch = buffer(symbolic.solve_in_place_scratch::<f64>(MAX_COLUMNS, Par::Seq))?;
@@ -173,6 +171,7 @@ impl SparseCholesky {
             MemStack::new(&mut self.factor_scratch),
             Spec::default(),
         );
+        restore_vector_state();
         match done {
             Ok(_) => Ok(()),
             Err(LltError::NonPositivePivot { index }) => {
@@ -197,6 +196,7 @@ impl SparseCholesky {
         let rhs = MatMut::from_column_major_slice_mut(columns, n, count);
         let stack = MemStack::new(&mut self.solve_scratch);
         LltRef::new(&self.symbolic, &self.factor).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack);
+        restore_vector_state();
     }
 }
 

@@ -191,7 +191,8 @@ impl Barrier {
                 let (x, y) = (e + de * t, f + df * t);
                 let along = y - x;
                 let s = -x.dot(&along) / along.norm_squared();
-                if !(s < -CONTACT_SLACK || s > 1.0 + CONTACT_SLACK) {
+                // An edge that has shrunk to a point (s is NaN) is a contact as well.
+                if s.is_nan() || (-CONTACT_SLACK..=1.0 + CONTACT_SLACK).contains(&s) {
                     first = t;
                 }
             }

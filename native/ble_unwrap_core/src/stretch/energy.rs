@@ -53,16 +53,11 @@ impl StretchEnergy {
         let w = w.clamp(0.0, 1.0);
         Self { area: 0.5 * (1.0 - w), dirichlet: 0.25 * w }
     }
-
-    /// The part of h that grows as the square of the scale; the rest, ¼I/d², falls as its inverse.
-    pub(super) fn growing(&self, i: f64, d: f64) -> f64 {
-        self.area * d + self.dirichlet * i
-    }
 }
 
 impl IsotropicEnergy for StretchEnergy {
     fn value(&self, i: f64, d: f64) -> f64 {
-        if d > 0.0 { 0.25 * i / (d * d) + self.growing(i, d) } else { f64::INFINITY }
+        if d > 0.0 { 0.25 * i / (d * d) + self.area * d + self.dirichlet * i } else { f64::INFINITY }
     }
 
     fn derivatives(&self, i: f64, d: f64) -> Derivatives {
@@ -98,13 +93,7 @@ impl IsotropicEnergy for FoldoverEnergy {
         let (n, r) = (0.5 * (i + d * d + 1.0), 1.0 / chi);
         let slope = -chi1 * r * r;
         let curve = (2.0 * chi1 * chi1 * r - chi2) * r * r;
-        Derivatives {
-            i: 0.5 * r,
-            d: d * r + n * slope,
-            ii: 0.0,
-            id: 0.5 * slope,
-            dd: r + 2.0 * d * slope + n * curve,
-        }
+        Derivatives { i: 0.5 * r, d: d * r + n * slope, ii: 0.0, id: 0.5 * slope, dd: r + 2.0 * d * slope + n * curve }
     }
 }
 
@@ -136,12 +125,7 @@ impl HatGradients {
     #[inline]
     pub(super) fn jacobian(&self, d1: Vector2<f64>, d2: Vector2<f64>) -> Matrix2<f64> {
         let (a, b) = (self.g[1], self.g[2]);
-        Matrix2::new(
-            d1.x * a.x + d2.x * b.x,
-            d1.x * a.y + d2.x * b.y,
-            d1.y * a.x + d2.y * b.x,
-            d1.y * a.y + d2.y * b.y,
-        )
+        Matrix2::new(d1.x * a.x + d2.x * b.x, d1.x * a.y + d2.x * b.y, d1.y * a.x + d2.y * b.x, d1.y * a.y + d2.y * b.y)
     }
 }
 

@@ -32,7 +32,8 @@ impl Grid {
         reach: f64,
         budget: usize,
     ) -> Option<Self> {
-        let (mut low, mut high) = (Point2::new(f64::INFINITY, f64::INFINITY), Point2::new(-f64::INFINITY, -f64::INFINITY));
+        let (mut low, mut high) =
+            (Point2::new(f64::INFINITY, f64::INFINITY), Point2::new(-f64::INFINITY, -f64::INFINITY));
         for i in 0..count {
             for p in hull(i) {
                 if !(p.x.is_finite() && p.y.is_finite()) {

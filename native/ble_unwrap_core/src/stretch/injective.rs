@@ -42,7 +42,11 @@ pub fn make_injective(
     start: &[Point2<f64>],
     progress: &Progress,
 ) -> Result<(Vec<Point2<f64>>, Injective), StretchError> {
-    assert_eq!((rest.len(), start.len()), (mesh.face_count(), mesh.vertex_count()), "a rest triangle a face, a point a vertex");
+    assert_eq!(
+        (rest.len(), start.len()),
+        (mesh.face_count(), mesh.vertex_count()),
+        "a rest triangle a face, a point a vertex"
+    );
     progress.check()?;
     if first_flip(mesh, start).is_none() {
         return Ok((start.to_vec(), Injective::AlreadyWas));
@@ -60,10 +64,8 @@ pub fn make_injective(
             return Ok((uv, Injective::FoldoverFree));
         }
     }
-    let rungs = [
-        (TutteBoundary::Shape(&start), Injective::TutteShape),
-        (TutteBoundary::Circle, Injective::TutteCircle),
-    ];
+    let rungs =
+        [(TutteBoundary::Shape(&start), Injective::TutteShape), (TutteBoundary::Circle, Injective::TutteCircle)];
     for (boundary, rung) in rungs {
         let Some(mut uv) = tutte_attempt(mesh, rest, boundary, progress)? else { continue };
         if first_flip(mesh, &uv).is_none() {

@@ -57,7 +57,7 @@ pub(super) fn minimise(
         sums = total(mesh, rest, &uv);
         let after = (sums.energy * sums.area).sqrt();
         result.iterations = sweep + 1;
-        if !(before - after > settings.tolerance * after) {
+        if before - after <= settings.tolerance * after {
             result.converged = true;
             break;
         }
@@ -188,9 +188,8 @@ fn search_line(
     let t = if fx < fy { x } else { y };
     let better = moved(t);
     let place = here + direction * t;
-    let positive = || {
-        mesh.outgoing(v).all(|h| orientation(place, uv[mesh.to(h).index()], uv[mesh.to(h.next()).index()]) > 0.0)
-    };
+    let positive =
+        || mesh.outgoing(v).all(|h| orientation(place, uv[mesh.to(h).index()], uv[mesh.to(h.next()).index()]) > 0.0);
     if better.energy * better.area < sums.energy * sums.area && positive() {
         *sums = better;
         uv[v.index()] = place;

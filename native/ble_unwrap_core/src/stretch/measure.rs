@@ -33,7 +33,11 @@ pub fn plane_area(mesh: &TriMesh, uv: &[Point2<f64>]) -> f64 {
 /// If there is not one rest triangle a face and one point a vertex.
 #[must_use]
 pub fn l2_stretch(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
-    assert_eq!((rest.len(), uv.len()), (mesh.face_count(), mesh.vertex_count()), "a rest triangle a face, a point a vertex");
+    assert_eq!(
+        (rest.len(), uv.len()),
+        (mesh.face_count(), mesh.vertex_count()),
+        "a rest triangle a face, a point a vertex"
+    );
     let energy: f64 = mesh
         .triangles()
         .iter()
@@ -50,7 +54,11 @@ pub fn l2_stretch(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> 
 /// If there is not one rest triangle a face and one point a vertex.
 #[must_use]
 pub fn linf_stretch(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
-    assert_eq!((rest.len(), uv.len()), (mesh.face_count(), mesh.vertex_count()), "a rest triangle a face, a point a vertex");
+    assert_eq!(
+        (rest.len(), uv.len()),
+        (mesh.face_count(), mesh.vertex_count()),
+        "a rest triangle a face, a point a vertex"
+    );
     let least = mesh
         .triangles()
         .iter()

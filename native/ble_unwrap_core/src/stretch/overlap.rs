@@ -183,15 +183,11 @@ mod tests {
         assert_eq!(first_flip(&mesh, &inverted), None);
         assert_eq!(boundary_defect(&mesh, &inverted), None);
         // The hole pushed out over the rim: simple loops, wrong orientations.
-        let out: Vec<_> = uv
-            .iter()
-            .map(|p| if p.coords.norm() < 1.01 { Point2::from(p.coords * 9.0) } else { *p })
-            .collect();
+        let out: Vec<_> =
+            uv.iter().map(|p| if p.coords.norm() < 1.01 { Point2::from(p.coords * 9.0) } else { *p }).collect();
         assert!(boundary_defect(&mesh, &out).is_none() && first_flip(&mesh, &out).is_some());
-        let mirrored: Vec<_> = uv
-            .iter()
-            .map(|p| if p.coords.norm() < 1.01 { Point2::new(-p.x, p.y) } else { *p })
-            .collect();
+        let mirrored: Vec<_> =
+            uv.iter().map(|p| if p.coords.norm() < 1.01 { Point2::new(-p.x, p.y) } else { *p }).collect();
         assert_eq!(boundary_defect(&mesh, &mirrored), Some(BoundaryDefect::Orientation));
     }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
-use super::energy::{HatGradients, IsotropicEnergy, StretchEnergy, face_derivatives};
+use super::energy::{HatGradients, IsotropicEnergy, face_derivatives};
 use crate::distortion::RestTriangle;
 use crate::linalg::{SparseCholesky, SparseError, SparsePattern};
 use crate::mesh::{HalfedgeId, TriMesh};
@@ -113,18 +113,6 @@ impl ChartSystem {
         (0..self.triangles.len()).map(|f| self.jacobian(f, uv).determinant()).fold(f64::INFINITY, f64::min)
     }
 
-    /// The factor by which to scale `uv` to make the energy least: (Q/P)^¼ for P t² + Q/t².
-    pub(super) fn best_scale(&self, energy: &StretchEnergy, uv: &[Point2<f64>]) -> f64 {
-        let (mut growing, mut falling) = (0.0, 0.0);
-        for face in 0..self.triangles.len() {
-            let j = self.jacobian(face, uv);
-            let (i, d) = (j.norm_squared(), j.determinant());
-            growing += self.weights[face] * energy.growing(i, d);
-            falling += self.weights[face] * 0.25 * i / (d * d);
-        }
-        (falling / growing).sqrt().sqrt()
-    }
-
     /// Gradient and projected Hessian of the energy at `uv`. O(faces).
     pub(super) fn assemble<E: IsotropicEnergy>(&mut self, energy: &E, uv: &[Point2<f64>]) {
         self.hessian.fill(0.0);
@@ -174,6 +162,7 @@ impl ChartSystem {
     }
 
     /// The assembled gradient, x and y of each vertex in turn.
+    #[cfg(test)]
     pub(super) fn gradient(&self) -> &[f64] {
         &self.gradient
     }
@@ -238,5 +227,70 @@ impl ChartSystem {
 pub(super) fn advance(uv: &[Point2<f64>], direction: &[f64], step: f64, out: &mut [Point2<f64>]) {
     for ((o, p), d) in out.iter_mut().zip(uv).zip(direction.chunks_exact(2)) {
         *o = Point2::new(p.x + step * d[0], p.y + step * d[1]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stretch::energy::StretchEnergy;
+    use crate::stretch::test_meshes::{grid, hemisphere};
+    use nalgebra::Point3;
+
+    fn nudge(uv: &[Point2<f64>], k: usize, by: f64) -> Vec<Point2<f64>> {
+        let mut moved = uv.to_vec();
+        moved[k / 2][k % 2] += by;
+        moved
+    }
+
+    #[test]
+    fn assembled_derivatives_match_finite_differences() {
+        // At an isometry no eigenvalue is negative, so that the projected Hessian is the Hessian.
+        let mesh = grid(4, 3, |x, y| Point3::new(x + 0.2 * y, y - 0.1 * x, 0.0));
+        let rest = RestTriangle::of_mesh(&mesh);
+        let energy = StretchEnergy::new(0.3);
+        let mut system = ChartSystem::new(&mesh, &rest).expect("analysis");
+        let flat: Vec<_> = mesh.positions().iter().map(|p| p.xy()).collect();
+        let bent: Vec<_> = flat.iter().map(|p| Point2::new(p.x + 0.1 * p.y * p.y, 1.2 * p.y)).collect();
+        let h = 1e-6;
+        system.assemble(&energy, &bent);
+        let gradient = system.gradient().to_vec();
+        for k in 0..gradient.len() {
+            let df = system.value(&energy, &nudge(&bent, k, h)) - system.value(&energy, &nudge(&bent, k, -h));
+            assert!((df / (2.0 * h) - gradient[k]).abs() < 1e-7, "{k}");
+        }
+        for k in 0..gradient.len() {
+            system.assemble(&energy, &nudge(&flat, k, h));
+            let plus = system.gradient().to_vec();
+            system.assemble(&energy, &nudge(&flat, k, -h));
+            let minus = system.gradient().to_vec();
+            system.assemble(&energy, &flat);
+            for l in 0..gradient.len() {
+                let entry = system.solver.pattern().position(l, k).map_or(0.0, |at| system.hessian[at]);
+                let difference = (plus[l] - minus[l]) / (2.0 * h);
+                assert!((entry - difference).abs() < 1e-6, "{l} {k}: {entry} {difference}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_first_flip_is_where_a_determinant_vanishes() {
+        let mesh = hemisphere(6);
+        let rest = RestTriangle::of_mesh(&mesh);
+        let system = ChartSystem::new(&mesh, &rest).expect("analysis");
+        let circle = crate::stretch::TutteBoundary::Circle;
+        let uv = crate::stretch::tutte_embedding(&mesh, &rest, circle, &crate::progress::Progress::new());
+        let uv = uv.expect("solver").expect("positive");
+        for seed in 0..20_u32 {
+            let direction: Vec<f64> =
+                (0..2 * uv.len() as u32).map(|k| f64::from((k * 7919 + seed * 104_729) % 1009) / 504.0 - 1.0).collect();
+            let limit = system.first_flip(&uv, &direction);
+            let least = |t: f64| {
+                let mut moved = uv.clone();
+                advance(&uv, &direction, t, &mut moved);
+                system.least_determinant(&moved)
+            };
+            assert!(limit.is_finite() && least(0.999 * limit) > 0.0 && least(1.001 * limit) < 0.0, "{limit}");
+        }
     }
 }

@@ -16,7 +16,7 @@ pub(super) fn grid(w: usize, h: usize, place: impl Fn(f64, f64) -> Point3<f64>) 
             triangles.extend(if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] });
         }
     }
-    keep_numbers(&positions, &triangles)
+    TriMesh::from_triangles(&positions, &triangles).0
 }
 
 /// A straight strip of unit squares, `length` long.
@@ -41,7 +41,7 @@ pub(super) fn annulus(around: usize, across: usize) -> TriMesh {
             triangles.extend([[a, d, c], [a, c, b]]);
         }
     }
-    keep_numbers(&positions, &triangles)
+    TriMesh::from_triangles(&positions, &triangles).0
 }
 
 /// A unit hemisphere over a grid of n×n squares mapped to the disk, pole in the middle.
@@ -53,10 +53,4 @@ pub(super) fn hemisphere(n: usize) -> TriMesh {
         let around = x.hypot(y).max(1e-300);
         Point3::new(latitude.sin() * x / around, latitude.sin() * y / around, latitude.cos())
     })
-}
-
-/// Builds the mesh and insists that vertices keep their numbers, which tests rely on.
-pub(super) fn keep_numbers(positions: &[Point3<f64>], triangles: &[[u32; 3]]) -> TriMesh {
-    // Vertices are numbered by first use: renumber the input so that the order is the mesh's own.
-    TriMesh::from_triangles(positions, triangles).0
 }
