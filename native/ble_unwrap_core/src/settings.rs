@@ -32,6 +32,8 @@ pub struct Settings {
     pub stretch_limit: f64,
     /// Whether coincident vertices are joined before charting.
     pub weld: bool,
+    /// Whether large components are cut on a coarse mesh first.
+    pub coarse: bool,
     /// Whether neighbouring charts are joined again where their union stays under the limit.
     pub merge: bool,
     /// Holes of charts.
@@ -58,6 +60,7 @@ impl Default for Settings {
         Self {
             stretch_limit: 1.1,
             weld: true,
+            coarse: true,
             merge: true,
             holes: Holes::Keep,
             chart_scale: ChartScale::Uniform,
@@ -78,6 +81,7 @@ impl Settings {
     pub fn paper() -> Self {
         Self {
             holes: Holes::Cut,
+            coarse: false,
             geodesics: GeodesicSettings::paper(),
             embedding: EmbeddingSettings::paper(),
             stretch: StretchSettings::paper(),
