@@ -99,7 +99,8 @@ pub(crate) fn embed(
     if let Some(kind) = kind {
         settings::set_word("kind", &mut chosen, kind)?;
     }
-    let dimensions = dimensions.map_or(Ok(2), |given| settings::whole("dimensions", given, [1, MOST_DIMENSIONS], ""))?;
+    let dimensions =
+        dimensions.map_or(Ok(2), |given| settings::whole("dimensions", given, [1, MOST_DIMENSIONS], ""))?;
     let shape = if chosen == DataKind::Points { "(n, p)" } else { "(n, n)" };
     let (data, n, p) = arrays::real_matrix(data, Argument { name: "data", shape })?;
     if chosen != DataKind::Points && n != p {
