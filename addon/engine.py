@@ -147,14 +147,31 @@ class Job:
         return _result(_translated(lambda module: self._job.result()))
 
 
-def measure(selection, uv, *, texture_size, margin):
-    """Measures any UVs of a selection, whoever made them; the keys of the native report."""
+def coincident_joined(positions, corner_vertices):
+    """Corner vertices in which vertices at exactly the same place count as one."""
+    order = np.lexsort(positions.T)
+    ordered = positions[order]
+    first = np.ones(len(positions), bool)
+    first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    representative = np.empty(len(positions), np.int32)
+    representative[order] = order[np.maximum.accumulate(np.where(first, np.arange(len(order)), 0))]
+    return representative[corner_vertices]
+
+
+def measure(selection, uv, *, texture_size, margin, weld=True):
+    """Measures any UVs of a selection, whoever made them; the keys of the native report.
+
+    With `weld`, charts run across coincident vertices as they do in `unwrap`: files often split vertices at every face.
+    """
+    corner_vertices = selection.corner_vertices
+    if weld:
+        corner_vertices = coincident_joined(selection.positions, corner_vertices)
     size = texture_size if isinstance(texture_size, int) else tuple(texture_size)
     return dict(
         _translated(
             lambda module: module.measure(
                 selection.positions,
-                selection.corner_vertices,
+                corner_vertices,
                 selection.face_offsets,
                 np.ascontiguousarray(uv, np.float32),
                 corner_triangles=selection.corner_triangles,
@@ -223,4 +240,4 @@ def lines(certificate, *, margin, stretch_limit):
 
 
 def _number(value):
-    return "?" if value is None else f"{float(value):.3f}"
+    return f"{float(value):.3f}" if value is not None and np.isfinite(value) else "?"
