@@ -116,6 +116,21 @@ def reexports() -> dict[str, str]:
     return names
 
 
+def files_of_tests() -> set[Path]:
+    """Files of modules that a `#[cfg(test)]` keeps out of the library."""
+    found = set()
+    for file in CORE.rglob("*.rs"):
+        source = file.read_text(encoding="utf-8")
+        folder = file.parent if file.name in ("mod.rs", "lib.rs") else file.with_suffix("")
+        for name in re.findall(r"(?m)^\s*#\[cfg\(test\)\]\s*(?:pub(?:\([^)]*\))?\s+)?mod (\w+);", source):
+            found |= {folder / f"{name}.rs", *(folder / name).rglob("*.rs")}
+    return found
+
+
+def library_files() -> list[Path]:
+    return sorted(set(CORE.rglob("*.rs")) - files_of_tests())
+
+
 def offences(file: Path, root_names: dict[str, str]) -> list[str]:
     me = (module_path(file) or ("lib",))[0]
     if me not in MAY_USE:
@@ -138,7 +153,7 @@ def offences(file: Path, root_names: dict[str, str]) -> list[str]:
 
 def test_core_layers():
     root_names = reexports()
-    files = sorted(CORE.rglob("*.rs"))
+    files = library_files()
     assert len(files) > 5, "the core was not found"
     assert not [offence for file in files for offence in offences(file, root_names)]
 
@@ -147,7 +162,7 @@ def test_core_neither_prints_nor_opens_files():
     forbidden = re.compile(r"\b(?:std::(?:fs|io|net|process|env)\b|e?print(?:ln)?!|dbg!|Instant::now|SystemTime)")
     found = [
         f"{file.relative_to(CORE)}: {match[0]}"
-        for file in sorted(CORE.rglob("*.rs"))
+        for file in library_files()
         for match in [forbidden.search(without_comments_and_tests(file.read_text(encoding="utf-8")))]
         if match
         and not (match[0] == "Instant::now" and module_path(file)[:1] == ("pipeline",))  # seconds of the report

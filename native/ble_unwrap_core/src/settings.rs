@@ -102,7 +102,7 @@ impl Settings {
         let checks: [(&'static str, f64, bool, &'static str); 14] = [
             ("stretch_limit", self.stretch_limit, self.stretch_limit > 1.0 && self.stretch_limit.is_finite(), "above 1"),
             ("landmark_fraction", g.landmark_fraction, g.landmark_fraction > 0.0 && g.landmark_fraction <= 1.0, "above 0 and at most 1"),
-            ("landmark_min", g.landmark_min as f64, g.landmark_min >= 4, "at least 4"),
+            ("landmark_min", g.landmark_min as f64, g.landmark_min >= 3, "at least 3"),
             ("landmark_max", g.landmark_max as f64, g.landmark_max >= g.landmark_min, "at least landmark_min"),
             ("first_parts", s.first_parts as f64, s.first_parts >= 2, "at least 2"),
             ("later_parts", s.later_parts as f64, s.later_parts >= 2, "at least 2"),

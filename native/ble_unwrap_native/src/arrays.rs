@@ -6,6 +6,7 @@
 
 use pyo3::buffer::{ElementType, PyUntypedBuffer};
 use pyo3::prelude::*;
+use pyo3::types::PyMemoryView;
 
 use crate::errors::InvalidArgumentError;
 
@@ -120,7 +121,8 @@ impl<'py> View<'py> {
     /// Takes the buffer of `object` and checks its element type and number of dimensions.
     fn new(object: &'py Bound<'py, PyAny>, argument: Argument, expected: &'static str) -> PyResult<Self> {
         let Argument { name, shape } = argument;
-        let buffer = PyUntypedBuffer::get(object).map_err(|_| {
+        // Through a memoryview, which fills in the strides that some exporters (ctypes) leave out.
+        let buffer = PyMemoryView::from(object).and_then(|view| PyUntypedBuffer::get(&view)).map_err(|_| {
             InvalidArgumentError::new_err(format!(
                 "{name}: expected {expected} array of shape {shape}, found {}; pass a numpy array",
                 type_name(object)

@@ -42,6 +42,9 @@ pub(crate) enum DataKind {
     Affinities,
 }
 
+/// Points can span no more dimensions than there are of them, and their n² distances must fit in memory.
+const MOST_DIMENSIONS: usize = 100_000;
+
 /// Embed points, distances or affinities in few dimensions by Bernoulli logistic embedding.
 ///
 /// Parameters
@@ -79,12 +82,15 @@ pub(crate) enum DataKind {
 ///
 /// Source: Bernoulli Embedding Model and Its Application in Texture Mapping, 2006, sections 3 and 4.
 #[pyfunction]
-#[pyo3(signature = (data, *, kind=None, dimensions=2, job=None, **settings))]
+#[pyo3(
+    signature = (data, *, kind=None, dimensions=None, job=None, **settings),
+    text_signature = "(data, *, kind='points', dimensions=2, job=None, **settings)"
+)]
 pub(crate) fn embed(
     py: Python<'_>,
     data: &Bound<'_, PyAny>,
     kind: Option<&Bound<'_, PyAny>>,
-    dimensions: usize,
+    dimensions: Option<&Bound<'_, PyAny>>,
     job: Option<Bound<'_, Job>>,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
@@ -93,6 +99,7 @@ pub(crate) fn embed(
     if let Some(kind) = kind {
         settings::set_word("kind", &mut chosen, kind)?;
     }
+    let dimensions = dimensions.map_or(Ok(2), |given| settings::whole("dimensions", given, [1, MOST_DIMENSIONS], ""))?;
     let shape = if chosen == DataKind::Points { "(n, p)" } else { "(n, n)" };
     let (data, n, p) = arrays::real_matrix(data, Argument { name: "data", shape })?;
     if chosen != DataKind::Points && n != p {

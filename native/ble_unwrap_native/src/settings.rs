@@ -136,8 +136,8 @@ const TABLE: &[Setting] = &[
     row("seed", Field::Seed(|c| &mut c.settings.seed), EMBED),
     row("geodesics", Field::Word(|c| &mut c.settings.geodesics.metric), GEODESICS),
     row("landmark_fraction", Field::Real(|c| &mut c.settings.geodesics.landmark_fraction, Interval::above(0.0, 1.0)), UNWRAP),
-    row("landmark_min", Field::Whole(|c| &mut c.settings.geodesics.landmark_min, [4, 100_000]), UNWRAP),
-    row("landmark_max", Field::Limit(|c| &mut c.settings.geodesics.landmark_max, [4, 100_000]), UNWRAP),
+    row("landmark_min", Field::Whole(|c| &mut c.settings.geodesics.landmark_min, [3, 100_000]), UNWRAP),
+    row("landmark_max", Field::Limit(|c| &mut c.settings.geodesics.landmark_max, [3, 100_000]), UNWRAP),
     row("model", Field::Word(|c| &mut c.settings.embedding.model), EMBED),
     row("kernel_width", Field::OptionalReal(|c| &mut c.settings.embedding.kernel_width, Interval::above(0.0, 1e3)), EMBED),
     row("relaxation", Field::Real(|c| &mut c.settings.embedding.relaxation, Interval::between(0.0, 2.0)), EMBED),
@@ -197,7 +197,7 @@ pub(crate) fn from_keywords(keywords: Option<&Bound<'_, PyDict>>, function: Func
 /// InvalidArgumentError
 ///     If there is no such preset.
 #[pyfunction]
-#[pyo3(signature = (preset=None))]
+#[pyo3(signature = (preset=None), text_signature = "(preset='default')")]
 pub(crate) fn default_settings<'py>(
     py: Python<'py>,
     preset: Option<&Bound<'py, PyAny>>,
@@ -273,7 +273,8 @@ fn real(name: &str, value: &Bound<'_, PyAny>, interval: Interval, or: &str) -> P
     found.ok_or_else(|| refusal(name, &format!("{}{or}", interval.text()), value))
 }
 
-fn whole<T>(name: &str, value: &Bound<'_, PyAny>, [least, most]: [T; 2], unit: &str) -> PyResult<T>
+/// A whole number within a range; `unit` ends the description of the range.
+pub(crate) fn whole<T>(name: &str, value: &Bound<'_, PyAny>, [least, most]: [T; 2], unit: &str) -> PyResult<T>
 where
     T: Copy + PartialOrd + std::fmt::Display + TryFrom<u64>,
 {
@@ -283,6 +284,7 @@ where
     found.ok_or_else(|| refusal(name, &format!("a whole number from {least} to {most}{unit}"), value))
 }
 
+/// Sets a choice by its word.
 pub(crate) fn set_word(name: &str, target: &mut dyn Words, value: &Bound<'_, PyAny>) -> PyResult<()> {
     let known = value.extract::<String>().is_ok_and(|word| target.set(&word));
     if known { Ok(()) } else { Err(refusal(name, &crate::words::listed(&target.words()), value)) }

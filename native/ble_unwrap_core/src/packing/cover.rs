@@ -23,10 +23,10 @@ impl Square {
 
 /// Squares inside the mask whose union is the mask; larger ones first.
 ///
-/// Greedy: at each level, from the largest that fits down to sides of four, squares on a lattice of
-/// half their side are taken where at least half of their cells are new; what is left, mostly the
-/// staircase of the boundary, goes into squares of two and single cells. O(cells · log side / 64)
-/// for the table of fitting squares and O(cells / 4) counts.
+/// Greedy: at each level, from the largest that fits down to sides of four, squares on a lattice are
+/// taken where at least half of their cells are new; what is left, mostly the staircase of the
+/// boundary, goes into squares of two and single cells. O(cells · log side / 64) for the table of
+/// fitting squares and O(cells / 4) for the counts.
 pub(super) fn cover(mask: &Mask) -> Vec<Square> {
     let fitting = fitting_squares(mask);
     let mut squares = Vec::new();
@@ -38,7 +38,12 @@ pub(super) fn cover(mask: &Mask) -> Vec<Square> {
     };
     for level in (2..fitting.len()).rev() {
         let side = 1usize << level;
-        let step = if level + 2 > fitting.len() { side / 4 } else if level + 3 > fitting.len() { side / 2 } else { side };
+        // The largest squares reject most positions: those are placed with care, the others on a tiling.
+        let step = match fitting.len() - level {
+            1 => side / 4,
+            2 => side / 2,
+            _ => side,
+        };
         for y in (0..=mask.height() - side).step_by(step) {
             for x in (0..=mask.width() - side).step_by(step) {
                 if !fitting[level].get(x, y) {
@@ -60,7 +65,12 @@ pub(super) fn cover(mask: &Mask) -> Vec<Square> {
                 continue;
             }
             // The later corners first: earlier seeds are covered already.
-            let corners = [(x, y), (x.wrapping_sub(reach), y), (x, y.wrapping_sub(reach)), (x.wrapping_sub(reach), y.wrapping_sub(reach))];
+            let corners = [
+                (x, y),
+                (x.wrapping_sub(reach), y),
+                (x, y.wrapping_sub(reach)),
+                (x.wrapping_sub(reach), y.wrapping_sub(reach)),
+            ];
             let fits = |&(a, b): &(usize, usize)| a < mask.width() && b < mask.height() && fitting[level].get(a, b);
             if let Some((a, b)) = corners.into_iter().find(fits) {
                 take(&mut left, a, b, level);

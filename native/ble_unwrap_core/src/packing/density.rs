@@ -8,12 +8,12 @@
 
 use rayon::prelude::*;
 
+use super::grid::Grid;
 use super::mask::Reach;
-use super::occupancy::Occupancy;
 use super::order::Strategy;
 use super::outline::Outline;
 use super::place::{Layout, place};
-use super::pose::base_turns;
+use super::pose::{base_turns, turn_alone};
 use super::shape::{SAFETY_TEXELS, Shape};
 use super::{PackError, PackSettings, Quality, Rotation};
 use crate::{Progress, Stage};
@@ -27,7 +27,7 @@ const COMPARED: usize = 8;
 const VARIED: usize = 4;
 /// From so many charts on, search rows are shared by similar footprints.
 const MANY: usize = 600;
-/// Attempts made before giving up shrinking; each without a fit takes at least a tenth of the density.
+/// Attempts made to find a first fit; from the ninth on each is at least a tenth less dense.
 const SHRINKS: u32 = 80;
 /// Share of the texture charts cover in the first guess, with half a margin around each.
 const FIRST_FILL: f64 = 0.8;
@@ -39,49 +39,12 @@ const NEAR: f64 = 0.015;
 /// Rounds without a better fit before the step is halved.
 const PATIENCE: usize = 3;
 
-/// The grid laid over the texture, half a margin from its border.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Grid {
-    /// Texels a cell.
-    pub(super) cell: f64,
-    pub(super) columns: usize,
-    pub(super) rows: usize,
-}
-
 /// The best placement found.
 pub(super) struct Best {
     pub(super) shapes: Vec<Shape>,
     pub(super) layout: Layout,
     /// Texels to a unit of the chart plane.
     pub(super) density: f64,
-}
-
-impl Grid {
-    /// Cells fine enough for `charts` charts; where there is a margin, a whole number of cells make it.
-    fn new(settings: &PackSettings, charts: usize) -> Result<Self, PackError> {
-        let (width, height) = (f64::from(settings.width), f64::from(settings.height));
-        let margin = settings.margin_texels;
-        let inner = width.min(height) - margin;
-        // A texel must be left for the chart.
-        if !(inner >= 1.0) {
-            return Err(PackError::MarginTooLarge { margin, width: settings.width, height: settings.height });
-        }
-        // About 100 cells across a chart: the raster then wastes 1 %; below 1024 rows time hardly falls.
-        let (least, most) = match settings.quality {
-            Quality::Fast => (1024.0, 2048.0),
-            Quality::High => (2048.0, 4096.0),
-        };
-        let across = (std::env::var("KK").map_or(100.0,|v|v.parse::<f64>().unwrap()) * (charts as f64).sqrt()).clamp(least, most);
-        let larger = width.max(height);
-        // Quarter texels at the finest.
-        let mut cell = (larger / across).max(0.25);
-        if margin > 0.0 {
-            cell = if margin >= cell { margin / (margin / cell - 1e-9).ceil() } else { margin };
-        }
-        cell = cell.max(larger / Occupancy::WIDEST as f64).min(inner);
-        let cells = |size: f64| (((size - margin) / cell + 1e-9).floor() as usize).max(1);
-        Ok(Self { cell, columns: cells(width), rows: cells(height) })
-    }
 }
 
 /// What a search needs to know, fixed throughout.
@@ -126,6 +89,20 @@ impl Search<'_> {
         let all: Vec<Attempt> = strategies.into_par_iter().map(attempt).collect::<Result<_, PackError>>()?;
         Ok(all.into_iter().reduce(|a, b| if b.used < a.used { b } else { a }))
     }
+
+    /// One attempt at a density where every chart is a speck or a point: whether they fit at all.
+    fn all_specks(&self, density: f64, settings: &PackSettings) -> Result<(Best, Grid), PackError> {
+        let shapes = self.shapes(density);
+        match self.best_of(&shapes, Strategy::portfolio(&shapes, 1))? {
+            Some(Attempt { used, layout, .. }) if used <= 1.0 => Ok((Best { shapes, layout, density }, self.grid)),
+            _ => Err(PackError::TooManyCharts {
+                charts: shapes.len(),
+                margin: settings.margin_texels,
+                width: settings.width,
+                height: settings.height,
+            }),
+        }
+    }
 }
 
 /// Places outlines at the greatest density found.
@@ -133,7 +110,9 @@ impl Search<'_> {
 /// # Errors
 /// [`PackError::MarginTooLarge`], [`PackError::TooManyCharts`], [`PackError::Cancelled`].
 pub(super) fn densest(
-    outlines: &[Outline], settings: &PackSettings, progress: &Progress,
+    outlines: &[Outline],
+    settings: &PackSettings,
+    progress: &Progress,
 ) -> Result<(Best, Grid), PackError> {
     let n = outlines.len();
     let grid = Grid::new(settings, n)?;
@@ -143,7 +122,12 @@ pub(super) fn densest(
     by_area.sort_by(|&a, &b| area(b).total_cmp(&area(a)).then(a.cmp(&b)));
     let mut large = vec![false; n];
     by_area.iter().take(LARGE).for_each(|&i| large[i] = true);
-    let turns = |i: usize| base_turns(&outlines[i], settings.rotation, large[i], n == 1);
+    let turns = |i: usize| match settings.rotation {
+        Rotation::Any if n == 1 => vec![turn_alone(&outlines[i], [grid.columns as f64, grid.rows as f64])],
+        // The given pose, in the frame of the grid.
+        Rotation::None if grid.sideways => vec![[0.0, 1.0]],
+        rotation => base_turns(&outlines[i], rotation, large[i]),
+    };
     let search = Search {
         outlines,
         turns: (0..n).into_par_iter().map(turns).collect(),
@@ -152,13 +136,15 @@ pub(super) fn densest(
         reach: Reach::new(settings.margin_texels / grid.cell),
         progress,
     };
-    if !(largest > 0.0) {
-        return search.without_extent(settings);
+    if largest <= 0.0 {
+        return search.all_specks(1.0, settings);
     }
     // From here on densities are texels to the largest extent: no overflow at any scale of input.
     let ceiling = f64::from(settings.width).hypot(f64::from(settings.height));
     let mut density = first_guess((0..n).map(area), settings, grid).min(ceiling);
     let budget = attempts(n, grid, settings.quality);
+    // Height used goes with the area, or with the length of a single chart.
+    let loosened = |used: f64| if n == 1 { 1.0 / used } else { 1.0 / used.sqrt() };
     let mut made = 0;
     let mut best: Option<(f64, Best)> = None;
     let mut lead: Option<(f64, Strategy)> = None;
@@ -169,7 +155,9 @@ pub(super) fn densest(
     while made < budget && shrinks < SHRINKS {
         progress.advance(Stage::Pack, made as f64 / budget as f64);
         let strategies = match &lead {
-            None => Strategy::portfolio(&shapes, if n == 1 { 1 } else if near { COMPARED } else { BRACKETING }),
+            None if n == 1 => Strategy::portfolio(&shapes, 1),
+            None if !near => Strategy::portfolio(&shapes, BRACKETING),
+            None => Strategy::portfolio(&shapes, if n < MANY { COMPARED } else { VARIED }),
             Some((used, lead)) => {
                 let keep = used.is_infinite().then(|| lead.clone());
                 let varied = (0..VARIED - usize::from(keep.is_some())).map(|k| lead.varied((made + k) as u64));
@@ -179,16 +167,15 @@ pub(super) fn densest(
         let count = strategies.len();
         let Some(Attempt { used, layout, strategy }) = search.best_of(&shapes, strategies)? else { break };
         let before = density;
-        if std::env::var("PACKDBG").is_ok() { eprintln!("made {made}+{count} d {density:.3} used {used:.4} step {step} lead {:?} cell {} budget {budget}", lead.as_ref().map(|l| l.0), grid.cell); }
         if used <= 1.0 {
             // Every density tried lies above the best that fitted: this one is better.
             best = Some((density, Best { shapes, layout, density: density / largest }));
             near = used > 1.0 - 2.0 * NEAR;
-            if used > 1.0 - NEAR && count > BRACKETING {
+            if count > BRACKETING {
                 lead = Some((f64::INFINITY, strategy));
             }
             (step, idle) = ((2.0 * step).min(STEP), 0);
-            density = (density / used.sqrt() * (1.0 + step)).min(ceiling);
+            density = (density * loosened(used) * (1.0 + step)).min(ceiling);
             // While bracketing, do not go back to what was too dense.
             if lead.is_none() && before < too_dense && density >= too_dense {
                 density = (before * too_dense).sqrt();
@@ -210,12 +197,9 @@ pub(super) fn densest(
             lead = lead.map(|l| (f64::INFINITY, l.1));
         } else {
             // Not a part of the search yet.
-            if shapes.iter().all(|s| s.is_speck || s.footprints.is_empty()) {
-                break;
-            }
             too_dense = density;
             shrinks += 1;
-            density *= (0.998 / used.sqrt()).clamp(0.5, 0.995 - 0.01 * f64::from(shrinks.min(9)));
+            density *= (0.998 * loosened(used)).clamp(0.5, 0.995 - 0.01 * f64::from(shrinks.min(9)));
             shapes = search.shapes(density / largest);
             continue;
         }
@@ -225,8 +209,10 @@ pub(super) fn densest(
         }
         shapes = search.shapes(density / largest);
     }
-    let too_many = PackError::TooManyCharts { charts: n, margin: settings.margin_texels, width: settings.width, height: settings.height };
-    Ok((best.ok_or(too_many)?.1, grid))
+    match best {
+        Some((_, best)) => Ok((best, grid)),
+        None => search.all_specks(0.5 / largest, settings),
+    }
 }
 
 /// How many attempts the search may make.
@@ -237,23 +223,10 @@ fn attempts(charts: usize, grid: Grid, quality: Quality) -> usize {
     // Measured: an attempt costs about so much, in 10 µs on one core.
     let cost = charts as f64 * grid.rows.max(grid.columns) as f64 / 1.5e5;
     let (work, least, most) = match quality {
-        Quality::Fast => (std::env::var("WW").map_or(80.0,|v|v.parse::<f64>().unwrap()), 16.0, 64.0),
-        Quality::High => (800.0, 64.0, 800.0),
+        Quality::Fast => (80.0, 10.0, 64.0),
+        Quality::High => (800.0, 64.0, 500.0),
     };
     (work / cost).clamp(least, most) as usize
-}
-
-impl Search<'_> {
-    /// Points only: each gets a cell, the density means nothing.
-    fn without_extent(&self, settings: &PackSettings) -> Result<(Best, Grid), PackError> {
-        let shapes = self.shapes(1.0);
-        let attempt = self.best_of(&shapes, Strategy::portfolio(&shapes, 1))?;
-        let n = shapes.len();
-        match attempt {
-            Some(a) if a.used <= 1.0 => Ok((Best { shapes, layout: a.layout, density: 1.0 }, self.grid)),
-            _ => Err(PackError::TooManyCharts { charts: n, margin: settings.margin_texels, width: settings.width, height: settings.height }),
-        }
-    }
 }
 
 /// Density at which squares of the charts' areas, with margin and raster waste added, cover
@@ -269,40 +242,4 @@ fn first_guess(areas: impl Iterator<Item = f64>, settings: &PackSettings, grid: 
     // a s² + 2 b s + c = 0. Without room for the gaps alone, or without area, start small.
     let root = (b * b - a * c).max(0.0).sqrt() - b;
     if root > 0.0 && a > 0.0 { root / a } else { 1.0 }
-}
-#[cfg(test)]
-mod scratch {
-    use super::*;
-    use crate::packing::PackItem;
-    use nalgebra::Point2;
-    fn load(path: &str) -> Vec<(Vec<Point2<f64>>, Vec<[u32; 3]>)> {
-        let text = std::fs::read_to_string(path).unwrap();
-        let mut it = text.split_ascii_whitespace();
-        let n: usize = it.next().unwrap().parse().unwrap();
-        (0..n).map(|_| {
-            let nv: usize = it.next().unwrap().parse().unwrap();
-            let nt: usize = it.next().unwrap().parse().unwrap();
-            let p = (0..nv).map(|_| Point2::new(it.next().unwrap().parse().unwrap(), it.next().unwrap().parse().unwrap())).collect();
-            let t = (0..nt).map(|_| [0; 3].map(|_: u32| it.next().unwrap().parse().unwrap())).collect();
-            (p, t)
-        }).collect()
-    }
-    #[test]
-    fn scratch_run() {
-        let path = std::env::var("PACKIN").unwrap();
-        let charts = load(&path);
-        let items: Vec<PackItem> = charts.iter().map(|(p, t)| PackItem { points: p, triangles: t }).collect();
-        let mut s = PackSettings::default();
-        let get = |k: &str, d: f64| std::env::var(k).ok().map_or(d, |v| v.parse().unwrap());
-        s.width = get("SIZE", 1024.0) as u32; s.height = s.width; s.margin_texels = get("MARGIN", 2.0);
-        if std::env::var("HIGH").is_ok() { s.quality = Quality::High; }
-        let t = std::time::Instant::now();
-        let r = crate::packing::pack(&items, &s, &Progress::new()).unwrap();
-        eprintln!("{path} charts {} eff {:.4} specks {} time {:.3}", items.len(), r.efficiency, r.specks, t.elapsed().as_secs_f64());
-        if let Ok(out) = std::env::var("PACKOUT") {
-            let mut o = String::new();
-            for (k, (p, t)) in charts.iter().enumerate() { for tri in t { o += &format!("{k}"); for &v in tri { let q = r.poses[k].texel(p[v as usize]); o += &format!(" {} {}", q.x / f64::from(s.width), q.y / f64::from(s.height)); } o += "\n"; } }
-            std::fs::write(out, o).unwrap();
-        }
-    }
 }

@@ -57,7 +57,7 @@ impl Mask {
         self.row(y)[x >> 6] >> (x & 63) & 1 == 1
     }
 
-    #[inline]
+    #[cfg(test)]
     pub(super) fn set(&mut self, x: usize, y: usize) {
         debug_assert!(x < self.width && y < self.height);
         let at = y * self.stride + (x >> 6);
@@ -108,6 +108,7 @@ impl Mask {
     }
 
     /// Number of cells.
+    #[cfg(test)]
     pub(super) fn count(&self) -> usize {
         self.words.iter().map(|w| w.count_ones() as usize).sum()
     }

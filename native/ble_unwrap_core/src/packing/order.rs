@@ -24,10 +24,10 @@ enum Size {
 /// one is within 3 % of another, the best of all 2 to 4 % above each).
 const PORTFOLIO: [(Goal, Size); 8] = [
     (Goal::Middle, Size::Area),
+    (Goal::Middle, Size::Extent),
     (Goal::Middle, Size::Box),
     (Goal::Top, Size::Area),
     (Goal::Centre, Size::Extent),
-    (Goal::Middle, Size::Extent),
     (Goal::Top, Size::Extent),
     (Goal::Centre, Size::Area),
     (Goal::Top, Size::Box),
@@ -35,8 +35,10 @@ const PORTFOLIO: [(Goal, Size); 8] = [
 
 /// Spread of the changes of log-priority: from swapping near neighbours to moving a chart by an octave.
 const SPREADS: [f64; 4] = [0.05, 0.15, 0.4, 0.1];
-/// One of so many variations is confined to a few charts, and changes those much.
+/// Half of the variations are confined to one chart in so many, and change those much.
 const FEW: u64 = 5;
+/// One variation in so many may change the goal.
+const OTHER_GOAL: u64 = 6;
 
 impl Strategy {
     /// The first `count` strategies of the portfolio.
@@ -59,19 +61,20 @@ impl Strategy {
     pub(super) fn varied(&self, number: u64) -> Self {
         let mut new = self.clone();
         let spread = SPREADS[(number % SPREADS.len() as u64) as usize];
-        let few = random(number, u64::MAX) % 2 == 0;
+        let few = random(number, u64::MAX).is_multiple_of(2);
         for (i, p) in new.priority.iter_mut().enumerate() {
             let bits = random(number, i as u64);
-            let (a, b) = ((bits >> 40) as f64 / (1u64 << 24) as f64, (bits >> 8 & 0xFF_FFFF) as f64 / (1u64 << 24) as f64);
+            let (a, b) =
+                ((bits >> 40) as f64 / (1u64 << 24) as f64, (bits >> 8 & 0xFF_FFFF) as f64 / (1u64 << 24) as f64);
             // The sum of two uniform numbers: a triangular distribution of unit variance.
             let noise = (a + b - 1.0) * 6.0_f64.sqrt();
             if !few {
                 *p *= (spread * noise).exp();
-            } else if bits % FEW == 0 {
+            } else if bits.is_multiple_of(FEW) {
                 *p *= (4.0 * spread * noise).exp();
             }
         }
-        if random(number, u64::MAX - 1) % 6 == 0 {
+        if random(number, u64::MAX - 1).is_multiple_of(OTHER_GOAL) {
             new.goal = PORTFOLIO[(random(number, u64::MAX - 2) % 4) as usize].0;
         }
         new

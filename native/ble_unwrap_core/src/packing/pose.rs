@@ -10,28 +10,52 @@ use super::outline::Outline;
 /// Angles tried besides the minimum-area rectangle's, for large charts, as shares of a quarter turn.
 /// Quarter turns of each come for free, so two of them are eight poses.
 const MORE_ANGLES: [f64; 2] = [1.0 / 3.0, 2.0 / 3.0];
-/// Angles tried for a chart alone in the texture: the placement is the pose.
-const ALONE: usize = 32;
+/// Angles compared for a chart alone in the texture, over half a turn.
+const ALONE: usize = 720;
 
 /// Cosine and sine of the base angles of a chart; the other poses are quarter turns of these.
 ///
 /// The first lays the minimum-area rectangle flat ([`Rotation::Any`]) or is the given pose.
-pub(super) fn base_turns(outline: &Outline, rotation: Rotation, large: bool, alone: bool) -> Vec<[f64; 2]> {
+pub(super) fn base_turns(outline: &Outline, rotation: Rotation, large: bool) -> Vec<[f64; 2]> {
     if rotation != Rotation::Any {
         return vec![[1.0, 0.0]];
     }
     let first = flat_turn(outline);
-    let mut turns = vec![first];
-    let mut add = |share: f64| {
+    let more = if large { &MORE_ANGLES[..] } else { &[] };
+    let turned = |&share: &f64| {
         let (s, c) = (share * FRAC_PI_2).sin_cos();
-        turns.push([first[0] * c - first[1] * s, first[1] * c + first[0] * s]);
+        [first[0] * c - first[1] * s, first[1] * c + first[0] * s]
     };
-    if alone {
-        (1..ALONE).for_each(|k| add(k as f64 / ALONE as f64));
-    } else if large {
-        MORE_ANGLES.into_iter().for_each(add);
+    std::iter::once(first).chain(more.iter().map(turned)).collect()
+}
+
+/// The turn in which a chart alone fits a rectangle of `inner` width and height at the largest scale:
+/// the minimum-area rectangle's or the best of half a turn in quarters of a degree.
+pub(super) fn turn_alone(outline: &Outline, inner: [f64; 2]) -> [f64; 2] {
+    let hull = convex_hull(&outline.points);
+    let scale = |[c, s]: [f64; 2]| {
+        let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
+        for p in &hull {
+            let at = [c * p.x - s * p.y, s * p.x + c * p.y];
+            for k in 0..2 {
+                (low[k], high[k]) = (low[k].min(at[k]), high[k].max(at[k]));
+            }
+        }
+        (inner[0] / (high[0] - low[0])).min(inner[1] / (high[1] - low[1]))
+    };
+    let [c, s] = flat_turn(outline);
+    let half_turn = (0..ALONE).map(|k| {
+        let (sin, cos) = (k as f64 * std::f64::consts::PI / ALONE as f64).sin_cos();
+        [c * cos - s * sin, s * cos + c * sin]
+    });
+    let mut best = (scale([c, s]), [c, s]);
+    for turn in half_turn {
+        let scale = scale(turn);
+        if scale > best.0 * (1.0 + 1e-9) {
+            best = (scale, turn);
+        }
     }
-    turns
+    best.1
 }
 
 /// Turn that lays the rectangle of least area around the outline along the axes, its longer side
@@ -49,7 +73,7 @@ fn flat_turn(outline: &Outline) -> [f64; 2] {
     let mut best = (f64::INFINITY, [1.0, 0.0]);
     for k in 0..n {
         let length = edge(k).norm();
-        if !(length > 0.0) {
+        if length <= 0.0 {
             continue;
         }
         let along = edge(k) / length;
@@ -134,11 +158,24 @@ mod tests {
     fn a_turned_rectangle_is_laid_flat() {
         for angle in [0.0, 0.3, 1.2, 2.0, 3.0, 4.0, 5.5] {
             let turn = nalgebra::Rotation2::new(angle);
-            let points: Vec<_> =
-                [[0.0, 0.0], [5.0, 0.0], [5.0, 2.0], [0.0, 2.0]].iter().map(|&[x, y]| turn * Point2::new(x, y)).collect();
+            let points: Vec<_> = [[0.0, 0.0], [5.0, 0.0], [5.0, 2.0], [0.0, 2.0]]
+                .iter()
+                .map(|&[x, y]| turn * Point2::new(x, y))
+                .collect();
             let [w, h] = size(&points, flat_turn(&outline(&points)));
             assert!((w - 5.0).abs() < 1e-9 && (h - 2.0).abs() < 1e-9, "{w} by {h} at {angle}");
         }
+    }
+
+    #[test]
+    fn alone_a_strip_takes_the_diagonal_and_a_square_the_square() {
+        let strip = outline(&[[0.0, 0.0], [9.0, 0.0], [9.0, 0.01], [0.0, 0.01]].map(|[x, y]| Point2::new(x, y)));
+        let [c, s] = turn_alone(&strip, [300.0, 100.0]);
+        let [w, h] = size(&strip.points, [c, s]);
+        assert!((300.0 / w).min(100.0 / h) > 0.99 * 300.0_f64.hypot(100.0), "{w} by {h}");
+        let square = outline(&[[0.0, 0.0], [3.0, 4.0], [-1.0, 7.0], [-4.0, 3.0]].map(|[x, y]| Point2::new(x, y)));
+        let [w, h] = size(&square.points, turn_alone(&square, [100.0, 100.0]));
+        assert!((w * square.unit() - 5.0).abs() < 1e-9 && (h * square.unit() - 5.0).abs() < 1e-9);
     }
 
     proptest! {
@@ -160,12 +197,12 @@ mod tests {
     fn turns_are_rotations_and_as_many_as_asked() {
         let points = [Point2::new(0.0, 0.0), Point2::new(3.0, 1.0), Point2::new(1.0, 2.0)];
         let o = outline(&points);
-        let turns = base_turns(&o, Rotation::Any, true, false);
+        let turns = base_turns(&o, Rotation::Any, true);
         assert_eq!(turns.len(), 3);
         assert!(turns.iter().all(|[c, s]| (c * c + s * s - 1.0).abs() < 1e-14));
-        assert_eq!(base_turns(&o, Rotation::Any, false, false).len(), 1);
-        assert_eq!(base_turns(&o, Rotation::Quarter, true, true), vec![[1.0, 0.0]]);
+        assert_eq!(base_turns(&o, Rotation::Any, false).len(), 1);
+        assert_eq!(base_turns(&o, Rotation::Quarter, true), vec![[1.0, 0.0]]);
         let empty = Outline::new(&PackItem { points: &[], triangles: &[] }, 0).expect("empty");
-        assert_eq!(base_turns(&empty, Rotation::Any, false, false), vec![[1.0, 0.0]]);
+        assert_eq!(base_turns(&empty, Rotation::Any, false), vec![[1.0, 0.0]]);
     }
 }

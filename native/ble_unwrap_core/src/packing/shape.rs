@@ -49,7 +49,7 @@ impl Shape {
     /// Footprints at `density` texels to a unit of the chart plane, on cells of `cell` texels.
     pub(super) fn new(outline: &Outline, turns: &[[f64; 2]], quarters: bool, density: f64, cell: f64) -> Self {
         let extent = density * outline.extent;
-        let is_speck = outline.extent > 0.0 && !(extent >= SPECK_TEXELS);
+        let is_speck = outline.extent > 0.0 && extent < SPECK_TEXELS;
         // Cells to an outline unit; a chart without extent is a point at any scale.
         let scale = if outline.extent == 0.0 { density } else { extent.max(SPECK_TEXELS) } / cell;
         let mut footprints: Vec<Footprint> = Vec::new();
@@ -102,14 +102,9 @@ impl Footprint {
         Self { mask, squares, cells, centre_y: moment / cells.max(1) as f64, to_cells }
     }
 
-    /// Chart plane to texels with the mask's corner at cell (x, y), cells of `cell` texels, and the
-    /// grid's corner at `border` texels.
-    pub(super) fn pose(&self, x: usize, y: usize, cell: f64, border: f64) -> Pose {
-        let mut pose = self.to_cells;
-        let corner = Vector2::new(x as f64, y as f64);
-        pose.scale *= cell;
-        pose.offset = (pose.offset + corner) * cell + Vector2::repeat(border);
-        pose
+    /// Chart plane to cells of the grid, with the mask's corner at cell (x, y).
+    pub(super) fn pose(&self, x: usize, y: usize) -> Pose {
+        Pose { offset: self.to_cells.offset + Vector2::new(x as f64, y as f64), ..self.to_cells }
     }
 }
 

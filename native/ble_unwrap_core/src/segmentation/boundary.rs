@@ -6,15 +6,12 @@
 
 use crate::geodesics::LandmarkDistances;
 use crate::linalg::{Mds, classical_mds};
-use crate::mesh::{TriMesh, measure};
+use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
 
 use super::CutGraph;
+use super::bends::{Bends, capacity};
 use super::polygon_graph::PolygonGraph;
-
-/// Capacities are integers, so that the cut does not depend on the order of sums; a side of mean
-/// length and mean cost gets this many units.
-const UNIT: f64 = 65536.0;
 
 /// Moves the borders between parts. `crease_weight` is the α of the capacity
 /// α/(1 + d/mean) + (1 − α)·(gᵢ + gⱼ)/(2·mean), with d = 1 − cos(dihedral) and g the difference between
@@ -100,35 +97,6 @@ impl Part {
     }
 }
 
-/// 1 − cos(dihedral) of each side, in the order of the graph's links.
-struct Bends {
-    first: Vec<usize>,
-    bend: Vec<f64>,
-    mean_bend: f64,
-    mean_length: f64,
-}
-
-impl Bends {
-    fn new(mesh: &TriMesh, graph: &PolygonGraph) -> Self {
-        let normals = measure::face_normals(mesh);
-        let mut first = Vec::with_capacity(graph.len());
-        let mut bend = Vec::new();
-        let (mut sum_bend, mut sum_length) = (0.0, 0.0);
-        for links in graph.links.iter() {
-            first.push(bend.len());
-            for link in links {
-                let (f, g) = (link.halfedge.face(), mesh.twin(link.halfedge).face());
-                let d = (1.0 - normals[f.index()].dot(&normals[g.index()])).clamp(0.0, 2.0);
-                sum_bend += d * link.length;
-                sum_length += link.length;
-                bend.push(d);
-            }
-        }
-        let mean = |sum: f64, n: f64| if n > 0.0 { sum / n } else { 0.0 };
-        Self { first, mean_bend: mean(sum_bend, sum_length), mean_length: mean(sum_length, bend.len() as f64), bend }
-    }
-}
-
 /// Two parts and the border between them.
 struct Pair<'a> {
     mesh: &'a TriMesh,
@@ -171,17 +139,14 @@ impl Pair<'_> {
             vec![0.0; nodes.len()]
         };
         let mean_misfit = (misfit.iter().sum::<f64>() / nodes.len() as f64).max(f64::MIN_POSITIVE);
-        let mean_bend = self.bends.mean_bend.max(f64::MIN_POSITIVE);
-        let mean_length = self.bends.mean_length.max(f64::MIN_POSITIVE);
         let mut cut = CutGraph::new(nodes.len());
         for (i, &p) in nodes.iter().enumerate() {
             for (k, link) in self.graph.links.group(p).iter().enumerate() {
                 let q = link.to as usize;
-                let crease = 1.0 / (1.0 + self.bends.bend[self.bends.first[p] + k] / mean_bend);
                 let other = if node[q] == usize::MAX { misfit[i] } else { misfit[node[q]] };
                 let fit = (misfit[i] + other) / (2.0 * mean_misfit);
-                let cost = crease_weight * crease + (1.0 - crease_weight) * fit;
-                let capacity = capacity(cost * link.length / mean_length);
+                let cost = crease_weight * self.bends.crease(p, k) + (1.0 - crease_weight) * fit;
+                let capacity = capacity(cost * link.length / self.bends.mean_length);
                 if node[q] != usize::MAX {
                     if p < q {
                         cut.add_edge(i, node[q], capacity);
@@ -198,9 +163,4 @@ impl Pair<'_> {
         }
         Ok(())
     }
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the range of capacities")]
-fn capacity(relative: f64) -> u64 {
-    (relative * UNIT).clamp(1.0, 1e12) as u64
 }

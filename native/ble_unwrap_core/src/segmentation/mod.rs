@@ -10,14 +10,18 @@
 //! 4. Boundaries: a minimum cut in a band around each border, drawn to creases and to short lines.
 //! 5. Repair: parts become connected, fragments go to a neighbour.
 //!
+//! [`straighten`] redraws borders that come from a coarser mesh.
+//!
 //! Polygons stay whole. The result is a label a face; each label is connected over polygon sides.
 
+mod bends;
 mod boundary;
 mod grow;
 mod min_cut;
 mod polygon_graph;
 mod repair;
 mod spectral;
+mod straighten;
 
 use crate::geodesics::LandmarkDistances;
 use crate::mesh::TriMesh;
@@ -26,6 +30,7 @@ use crate::progress::{Cancelled, Progress};
 pub use min_cut::CutGraph;
 use polygon_graph::PolygonGraph;
 pub use spectral::SpectralAnalysis;
+pub use straighten::straighten;
 
 /// Parameters of the segmentation.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,11 +99,14 @@ pub fn bisect(mesh: &TriMesh, polygon: &[u32]) -> Segmentation {
 }
 
 fn finish(graph: &PolygonGraph, mut label: Vec<u32>) -> Segmentation {
-    repair::absorb_fragments(graph, &mut label);
-    let mut parts = graph.split_components(&mut label);
-    if parts < 2 {
+    if graph.split_components(&mut label.clone()) < 2 {
         label = grow::halves(graph);
-        parts = graph.split_components(&mut label);
     }
+    finish_labels(graph, label)
+}
+
+fn finish_labels(graph: &PolygonGraph, mut label: Vec<u32>) -> Segmentation {
+    repair::absorb_fragments(graph, &mut label);
+    let parts = graph.split_components(&mut label);
     Segmentation { label: graph.of_face.iter().map(|&p| label[p as usize]).collect(), parts }
 }

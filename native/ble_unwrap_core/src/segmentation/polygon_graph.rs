@@ -62,6 +62,26 @@ impl PolygonGraph {
         self.faces.len()
     }
 
+    /// For each polygon the label of most of its area; ties go to the lower label.
+    pub(super) fn majority(&self, mesh: &TriMesh, face_label: &[u32]) -> Vec<u32> {
+        let of = |faces: &[FaceId]| {
+            let mut share: Vec<(u32, f64)> = faces
+                .iter()
+                .map(|&f| (face_label[f.index()], measure::triangle_area(mesh.triangle_positions(f))))
+                .collect();
+            share.sort_by_key(|s| s.0);
+            let mut best = (share[0].0, f64::NEG_INFINITY);
+            for same in share.chunk_by(|a, b| a.0 == b.0) {
+                let area = same.iter().map(|s| s.1).sum();
+                if area > best.1 {
+                    best = (same[0].0, area);
+                }
+            }
+            best.0
+        };
+        self.faces.iter().map(of).collect()
+    }
+
     /// Mean over the corners of a polygon of a value given at vertices.
     pub(super) fn mean_at(&self, mesh: &TriMesh, polygon: usize, value: impl Fn(usize) -> f64) -> f64 {
         let faces = self.faces.group(polygon);

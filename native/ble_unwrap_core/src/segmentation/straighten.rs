@@ -1,0 +1,168 @@
+//! Borders drawn short and along creases in a narrow band of the fine mesh.
+//!
+//! Labels prolonged from a coarse mesh follow its edges in steps; a minimum cut a few polygons wide
+//! around every border replaces them by the shortest line there is.
+
+use std::collections::VecDeque;
+
+use crate::mesh::TriMesh;
+use crate::progress::{Cancelled, Progress};
+
+use super::bends::{Bends, capacity};
+use super::polygon_graph::PolygonGraph;
+use super::{CutGraph, Segmentation, finish_labels};
+
+/// Redraws the borders between labels, each by one minimum cut among the polygons fewer than `rings`
+/// sides away from it, and makes every label connected (fragments go to a neighbour).
+///
+/// `label` holds any number a face; a polygon goes to the label of most of its area. `polygon` names
+/// the polygon of each face. O(n log n) and a cut a pair of neighbouring labels.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn straighten(
+    mesh: &TriMesh,
+    polygon: &[u32],
+    label: &[u32],
+    rings: usize,
+    progress: &Progress,
+) -> Result<Segmentation, Cancelled> {
+    let graph = PolygonGraph::new(mesh, polygon);
+    let mut label = graph.majority(mesh, label);
+    super::repair::absorb_fragments(&graph, &mut label);
+    let bends = Bends::new(mesh, &graph);
+    let mut pairs: Vec<(u32, u32)> = Vec::new();
+    for p in 0..graph.len() {
+        let beyond = graph.links.group(p).iter().map(|l| label[l.to as usize]);
+        pairs.extend(beyond.filter(|&q| q > label[p]).map(|q| (label[p], q)));
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    let mut band = Band { ring: vec![usize::MAX; graph.len()], node: vec![usize::MAX; graph.len()], order: Vec::new() };
+    for (a, b) in pairs {
+        progress.check()?;
+        band.gather(&graph, &label, a, b, rings);
+        band.cut(&graph, &bends, &mut label, a, b, progress)?;
+        band.clear();
+    }
+    Ok(finish_labels(&graph, label))
+}
+
+/// The polygons around one border, by distance from it in sides.
+struct Band {
+    ring: Vec<usize>,
+    node: Vec<usize>,
+    order: Vec<usize>,
+}
+
+impl Band {
+    fn gather(&mut self, graph: &PolygonGraph, label: &[u32], a: u32, b: u32, rings: usize) {
+        let inside = |p: usize| label[p] == a || label[p] == b;
+        let at_border = |p: usize| {
+            let other = if label[p] == a { b } else { a };
+            inside(p) && graph.links.group(p).iter().any(|l| label[l.to as usize] == other)
+        };
+        let mut queue: VecDeque<usize> = (0..graph.len()).filter(|&p| at_border(p)).collect();
+        for &p in &queue {
+            self.ring[p] = 0;
+        }
+        while let Some(p) = queue.pop_front() {
+            self.node[p] = self.order.len();
+            self.order.push(p);
+            if self.ring[p] + 1 >= rings {
+                continue;
+            }
+            for link in graph.links.group(p) {
+                let q = link.to as usize;
+                if self.ring[q] == usize::MAX && inside(q) {
+                    self.ring[q] = self.ring[p] + 1;
+                    queue.push_back(q);
+                }
+            }
+        }
+    }
+
+    fn cut(
+        &self,
+        graph: &PolygonGraph,
+        bends: &Bends,
+        label: &mut [u32],
+        a: u32,
+        b: u32,
+        progress: &Progress,
+    ) -> Result<(), Cancelled> {
+        let mut cut = CutGraph::new(self.order.len());
+        let mut anchored = [false; 2];
+        for (i, &p) in self.order.iter().enumerate() {
+            for (k, link) in graph.links.group(p).iter().enumerate() {
+                let q = link.to as usize;
+                let capacity = capacity(bends.crease(p, k) * link.length / bends.mean_length);
+                if self.node[q] != usize::MAX {
+                    if p < q {
+                        cut.add_edge(i, self.node[q], capacity);
+                    }
+                } else if label[q] == a {
+                    cut.add_terminals(i, capacity, 0);
+                    anchored[0] = true;
+                } else if label[q] == b {
+                    cut.add_terminals(i, 0, capacity);
+                    anchored[1] = true;
+                }
+            }
+        }
+        // A label that lies wholly in the band would vanish: its innermost polygon stays.
+        for (side, name) in [a, b].into_iter().enumerate() {
+            if !anchored[side] {
+                let members = self.order.iter().enumerate().filter(|(_, p)| label[**p] == name);
+                let Some((i, _)) = members.max_by_key(|&(i, &p)| (self.ring[p], i)) else { return Ok(()) };
+                if side == 0 { cut.fix_to_source(i) } else { cut.fix_to_sink(i) }
+            }
+        }
+        for (&p, on_side_of_a) in self.order.iter().zip(cut.min_cut(progress)?) {
+            label[p] = if on_side_of_a { a } else { b };
+        }
+        Ok(())
+    }
+
+    fn clear(&mut self) {
+        for p in self.order.drain(..) {
+            self.ring[p] = usize::MAX;
+            self.node[p] = usize::MAX;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::test_surfaces;
+
+    #[test]
+    fn a_staircase_becomes_a_straight_line() {
+        let mesh = test_surfaces::grid(20, 20, [1.0, 1.0], 0.0);
+        let polygon: Vec<u32> = (0..mesh.face_count() as u32).map(|f| f / 2).collect();
+        // A border that swings about the middle by two columns.
+        let label: Vec<u32> = mesh
+            .faces()
+            .map(|f| {
+                let c = mesh.triangle_positions(f).iter().map(|p| p.coords).sum::<nalgebra::Vector3<f64>>() / 3.0;
+                let swing = 0.1 * ((c.y * 20.0).floor() * 1.7).sin();
+                u32::from(c.x > 0.5 + swing)
+            })
+            .collect();
+        let border = |label: &[u32]| -> f64 {
+            let differs = |h: &crate::mesh::HalfedgeId| {
+                let t = mesh.twin(*h);
+                !t.is_none() && label[h.face().index()] != label[t.face().index()]
+            };
+            mesh.edges().filter(differs).map(|h| mesh.edge_length(h)).sum()
+        };
+        let straight = straighten(&mesh, &polygon, &label, 8, &Progress::new()).expect("not cancelled");
+        assert_eq!(straight.parts, 2);
+        assert!(border(&label) > 2.0, "the start is ragged: {}", border(&label));
+        assert!((border(&straight.label) - 1.0).abs() < 1e-9, "{}", border(&straight.label));
+        for (f, p) in polygon.iter().enumerate() {
+            assert_eq!(straight.label[f], straight.label[2 * *p as usize], "polygon {p} is whole");
+        }
+    }
+}
