@@ -8,6 +8,8 @@ import numpy as np
 MARGIN_SLACK_TEXELS = 0.01
 STRETCH_SLACK = 1e-3
 
+# Gaps are searched for up to this distance, or twice the margin: what is reported at that value may be larger.
+SEARCHED_TEXELS = 8
 # Settings whose 0 in the panel is the native module's None.
 ZERO_IS_AUTOMATIC = ("landmark_max", "kernel_width")
 
@@ -192,7 +194,7 @@ def certify(measured, *, margin, stretch_limit=None, warnings=()):
     if measured.get("unmapped_faces"):
         certificate.violations.append(f"{measured['unmapped_faces']} faces without UVs")
     gap = measured.get("gap_texels")
-    if gap is not None and measured.get("charts", 0) > 1 and gap < margin - MARGIN_SLACK_TEXELS:
+    if gap is not None and np.isfinite(gap) and measured.get("charts", 0) > 1 and gap < margin - MARGIN_SLACK_TEXELS:
         certificate.violations.append(f"charts {gap:.2f} px apart, margin is {margin:g} px")
     worst = measured.get("l2_worst_chart")
     if stretch_limit is not None and worst is not None and worst > stretch_limit + STRETCH_SLACK:
@@ -230,7 +232,8 @@ def lines(certificate, *, margin, stretch_limit):
         ("BAD" if flips else "OK", f"{flips} flipped faces"),
     ]
     if charts > 1 and gap is not None:
-        result.append(("OK" if gap_ok else "BAD", f"Margin {gap:.1f} of {margin:g} px"))
+        least = "≥ " if gap >= max(SEARCHED_TEXELS, 2 * margin) else ""
+        result.append(("OK" if gap_ok else "BAD", f"Charts {least}{gap:.1f} px apart (margin {margin:g})"))
     if unmapped:
         result.append(("BAD", f"{unmapped} faces without UVs"))
     result.append(("INFO", f"{100 * float(measured.get('packing_efficiency') or 0):.1f}% of the texture used"))
