@@ -38,7 +38,13 @@ pub(super) fn cover(mask: &Mask) -> Vec<Square> {
     };
     for level in (2..fitting.len()).rev() {
         let side = 1usize << level;
-        let step = if level + 2 > fitting.len() { side / 4 } else if level + 3 > fitting.len() { side / 2 } else { side };
+        let step = if level + 2 > fitting.len() {
+            side / 4
+        } else if level + 3 > fitting.len() {
+            side / 2
+        } else {
+            side
+        };
         for y in (0..=mask.height() - side).step_by(step) {
             for x in (0..=mask.width() - side).step_by(step) {
                 if !fitting[level].get(x, y) {
@@ -60,7 +66,12 @@ pub(super) fn cover(mask: &Mask) -> Vec<Square> {
                 continue;
             }
             // The later corners first: earlier seeds are covered already.
-            let corners = [(x, y), (x.wrapping_sub(reach), y), (x, y.wrapping_sub(reach)), (x.wrapping_sub(reach), y.wrapping_sub(reach))];
+            let corners = [
+                (x, y),
+                (x.wrapping_sub(reach), y),
+                (x, y.wrapping_sub(reach)),
+                (x.wrapping_sub(reach), y.wrapping_sub(reach)),
+            ];
             let fits = |&(a, b): &(usize, usize)| a < mask.width() && b < mask.height() && fitting[level].get(a, b);
             if let Some((a, b)) = corners.into_iter().find(fits) {
                 take(&mut left, a, b, level);

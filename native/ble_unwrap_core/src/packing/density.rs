@@ -71,7 +71,8 @@ impl Grid {
             Quality::Fast => (1024.0, 2048.0),
             Quality::High => (2048.0, 4096.0),
         };
-        let across = (std::env::var("KK").map_or(100.0,|v|v.parse::<f64>().unwrap()) * (charts as f64).sqrt()).clamp(least, most);
+        let across = (std::env::var("KK").map_or(100.0, |v| v.parse::<f64>().unwrap()) * (charts as f64).sqrt())
+            .clamp(least, most);
         let larger = width.max(height);
         // Quarter texels at the finest.
         let mut cell = (larger / across).max(0.25);
@@ -133,7 +134,9 @@ impl Search<'_> {
 /// # Errors
 /// [`PackError::MarginTooLarge`], [`PackError::TooManyCharts`], [`PackError::Cancelled`].
 pub(super) fn densest(
-    outlines: &[Outline], settings: &PackSettings, progress: &Progress,
+    outlines: &[Outline],
+    settings: &PackSettings,
+    progress: &Progress,
 ) -> Result<(Best, Grid), PackError> {
     let n = outlines.len();
     let grid = Grid::new(settings, n)?;
@@ -169,7 +172,16 @@ pub(super) fn densest(
     while made < budget && shrinks < SHRINKS {
         progress.advance(Stage::Pack, made as f64 / budget as f64);
         let strategies = match &lead {
-            None => Strategy::portfolio(&shapes, if n == 1 { 1 } else if near { COMPARED } else { BRACKETING }),
+            None => Strategy::portfolio(
+                &shapes,
+                if n == 1 {
+                    1
+                } else if near {
+                    COMPARED
+                } else {
+                    BRACKETING
+                },
+            ),
             Some((used, lead)) => {
                 let keep = used.is_infinite().then(|| lead.clone());
                 let varied = (0..VARIED - usize::from(keep.is_some())).map(|k| lead.varied((made + k) as u64));
@@ -179,7 +191,13 @@ pub(super) fn densest(
         let count = strategies.len();
         let Some(Attempt { used, layout, strategy }) = search.best_of(&shapes, strategies)? else { break };
         let before = density;
-        if std::env::var("PACKDBG").is_ok() { eprintln!("made {made}+{count} d {density:.3} used {used:.4} step {step} lead {:?} cell {} budget {budget}", lead.as_ref().map(|l| l.0), grid.cell); }
+        if std::env::var("PACKDBG").is_ok() {
+            eprintln!(
+                "made {made}+{count} d {density:.3} used {used:.4} step {step} lead {:?} cell {} budget {budget}",
+                lead.as_ref().map(|l| l.0),
+                grid.cell
+            );
+        }
         if used <= 1.0 {
             // Every density tried lies above the best that fitted: this one is better.
             best = Some((density, Best { shapes, layout, density: density / largest }));
@@ -225,7 +243,12 @@ pub(super) fn densest(
         }
         shapes = search.shapes(density / largest);
     }
-    let too_many = PackError::TooManyCharts { charts: n, margin: settings.margin_texels, width: settings.width, height: settings.height };
+    let too_many = PackError::TooManyCharts {
+        charts: n,
+        margin: settings.margin_texels,
+        width: settings.width,
+        height: settings.height,
+    };
     Ok((best.ok_or(too_many)?.1, grid))
 }
 
@@ -237,7 +260,7 @@ fn attempts(charts: usize, grid: Grid, quality: Quality) -> usize {
     // Measured: an attempt costs about so much, in 10 µs on one core.
     let cost = charts as f64 * grid.rows.max(grid.columns) as f64 / 1.5e5;
     let (work, least, most) = match quality {
-        Quality::Fast => (std::env::var("WW").map_or(80.0,|v|v.parse::<f64>().unwrap()), 16.0, 64.0),
+        Quality::Fast => (std::env::var("WW").map_or(80.0, |v| v.parse::<f64>().unwrap()), 16.0, 64.0),
         Quality::High => (800.0, 64.0, 800.0),
     };
     (work / cost).clamp(least, most) as usize
@@ -251,7 +274,12 @@ impl Search<'_> {
         let n = shapes.len();
         match attempt {
             Some(a) if a.used <= 1.0 => Ok((Best { shapes, layout: a.layout, density: 1.0 }, self.grid)),
-            _ => Err(PackError::TooManyCharts { charts: n, margin: settings.margin_texels, width: settings.width, height: settings.height }),
+            _ => Err(PackError::TooManyCharts {
+                charts: n,
+                margin: settings.margin_texels,
+                width: settings.width,
+                height: settings.height,
+            }),
         }
     }
 }
@@ -279,13 +307,17 @@ mod scratch {
         let text = std::fs::read_to_string(path).unwrap();
         let mut it = text.split_ascii_whitespace();
         let n: usize = it.next().unwrap().parse().unwrap();
-        (0..n).map(|_| {
-            let nv: usize = it.next().unwrap().parse().unwrap();
-            let nt: usize = it.next().unwrap().parse().unwrap();
-            let p = (0..nv).map(|_| Point2::new(it.next().unwrap().parse().unwrap(), it.next().unwrap().parse().unwrap())).collect();
-            let t = (0..nt).map(|_| [0; 3].map(|_: u32| it.next().unwrap().parse().unwrap())).collect();
-            (p, t)
-        }).collect()
+        (0..n)
+            .map(|_| {
+                let nv: usize = it.next().unwrap().parse().unwrap();
+                let nt: usize = it.next().unwrap().parse().unwrap();
+                let p = (0..nv)
+                    .map(|_| Point2::new(it.next().unwrap().parse().unwrap(), it.next().unwrap().parse().unwrap()))
+                    .collect();
+                let t = (0..nt).map(|_| [0; 3].map(|_: u32| it.next().unwrap().parse().unwrap())).collect();
+                (p, t)
+            })
+            .collect()
     }
     #[test]
     fn scratch_run() {
@@ -294,14 +326,33 @@ mod scratch {
         let items: Vec<PackItem> = charts.iter().map(|(p, t)| PackItem { points: p, triangles: t }).collect();
         let mut s = PackSettings::default();
         let get = |k: &str, d: f64| std::env::var(k).ok().map_or(d, |v| v.parse().unwrap());
-        s.width = get("SIZE", 1024.0) as u32; s.height = s.width; s.margin_texels = get("MARGIN", 2.0);
-        if std::env::var("HIGH").is_ok() { s.quality = Quality::High; }
+        s.width = get("SIZE", 1024.0) as u32;
+        s.height = s.width;
+        s.margin_texels = get("MARGIN", 2.0);
+        if std::env::var("HIGH").is_ok() {
+            s.quality = Quality::High;
+        }
         let t = std::time::Instant::now();
         let r = crate::packing::pack(&items, &s, &Progress::new()).unwrap();
-        eprintln!("{path} charts {} eff {:.4} specks {} time {:.3}", items.len(), r.efficiency, r.specks, t.elapsed().as_secs_f64());
+        eprintln!(
+            "{path} charts {} eff {:.4} specks {} time {:.3}",
+            items.len(),
+            r.efficiency,
+            r.specks,
+            t.elapsed().as_secs_f64()
+        );
         if let Ok(out) = std::env::var("PACKOUT") {
             let mut o = String::new();
-            for (k, (p, t)) in charts.iter().enumerate() { for tri in t { o += &format!("{k}"); for &v in tri { let q = r.poses[k].texel(p[v as usize]); o += &format!(" {} {}", q.x / f64::from(s.width), q.y / f64::from(s.height)); } o += "\n"; } }
+            for (k, (p, t)) in charts.iter().enumerate() {
+                for tri in t {
+                    o += &format!("{k}");
+                    for &v in tri {
+                        let q = r.poses[k].texel(p[v as usize]);
+                        o += &format!(" {} {}", q.x / f64::from(s.width), q.y / f64::from(s.height));
+                    }
+                    o += "\n";
+                }
+            }
             std::fs::write(out, o).unwrap();
         }
     }

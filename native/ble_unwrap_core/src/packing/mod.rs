@@ -184,7 +184,10 @@ impl Packed {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum PackError {
     /// A texture without texels, or too large for f32 coordinates to tell fractions of a texel.
-    #[error("a texture of {width} by {height} texels cannot be packed: choose 1 to {} each", PackSettings::LARGEST_SIZE)]
+    #[error(
+        "a texture of {width} by {height} texels cannot be packed: choose 1 to {} each",
+        PackSettings::LARGEST_SIZE
+    )]
     TextureSize {
         /// Width asked for.
         width: u32,
@@ -198,7 +201,9 @@ pub enum PackError {
         margin: f64,
     },
     /// The border alone takes the whole texture.
-    #[error("a margin of {margin} texels leaves no room in a texture of {width} by {height}: choose a smaller margin or a larger texture")]
+    #[error(
+        "a margin of {margin} texels leaves no room in a texture of {width} by {height}: choose a smaller margin or a larger texture"
+    )]
     MarginTooLarge {
         /// Margin asked for.
         margin: f64,
@@ -208,7 +213,9 @@ pub enum PackError {
         height: u32,
     },
     /// Even with every chart a texel large they do not fit.
-    #[error("{charts} charts with a margin of {margin} texels do not fit a texture of {width} by {height}: choose a smaller margin or a larger texture, or make fewer charts")]
+    #[error(
+        "{charts} charts with a margin of {margin} texels do not fit a texture of {width} by {height}: choose a smaller margin or a larger texture, or make fewer charts"
+    )]
     TooManyCharts {
         /// Number of charts.
         charts: usize,
@@ -220,7 +227,9 @@ pub enum PackError {
         height: u32,
     },
     /// A coordinate is not a number, infinite or beyond 1e150.
-    #[error("triangle {triangle} of chart {item} has a coordinate that is not finite or beyond 1e150: repair or leave out the chart")]
+    #[error(
+        "triangle {triangle} of chart {item} has a coordinate that is not finite or beyond 1e150: repair or leave out the chart"
+    )]
     NotFinite {
         /// The item.
         item: usize,
@@ -269,9 +278,7 @@ pub fn pack(items: &[PackItem<'_>], settings: &PackSettings, progress: &Progress
     let mut poses = Vec::with_capacity(items.len());
     for ((outline, shape), placed) in outlines.iter().zip(&best.shapes).zip(&best.layout.placed) {
         let pose = match placed {
-            Some(at) => {
-                shape.footprints[at.footprint].pose(at.x, at.y, grid.cell, 0.5 * settings.margin_texels)
-            }
+            Some(at) => shape.footprints[at.footprint].pose(at.x, at.y, grid.cell, 0.5 * settings.margin_texels),
             // Only items without triangles are not placed.
             None => Pose { cos: 1.0, sin: 0.0, centre: outline.centre, scale: best.density, offset: middle },
         };

@@ -62,7 +62,8 @@ impl Strategy {
         let few = random(number, u64::MAX) % 2 == 0;
         for (i, p) in new.priority.iter_mut().enumerate() {
             let bits = random(number, i as u64);
-            let (a, b) = ((bits >> 40) as f64 / (1u64 << 24) as f64, (bits >> 8 & 0xFF_FFFF) as f64 / (1u64 << 24) as f64);
+            let (a, b) =
+                ((bits >> 40) as f64 / (1u64 << 24) as f64, (bits >> 8 & 0xFF_FFFF) as f64 / (1u64 << 24) as f64);
             // The sum of two uniform numbers: a triangular distribution of unit variance.
             let noise = (a + b - 1.0) * 6.0_f64.sqrt();
             if !few {

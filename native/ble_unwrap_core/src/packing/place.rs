@@ -77,7 +77,11 @@ const SUMMARISED: usize = 4;
 
 /// Best free position of a footprint cheaper than `limit`, and the first row that may have a free one.
 fn best_position(
-    grid: &Occupancy, f: &Footprint, goal: Goal, first_row: usize, limit: f64,
+    grid: &Occupancy,
+    f: &Footprint,
+    goal: Goal,
+    first_row: usize,
+    limit: f64,
 ) -> (Option<(f64, usize, usize)>, usize) {
     let (w, h) = (f.mask.width(), f.mask.height());
     if w > grid.width() || h > grid.height() {
@@ -128,7 +132,12 @@ fn best_position(
 /// # Errors
 /// [`Cancelled`].
 pub(super) fn place(
-    shapes: &[Shape], order: &[usize], [width, height]: [usize; 2], reach: &Reach, goal: Goal, alike: bool,
+    shapes: &[Shape],
+    order: &[usize],
+    [width, height]: [usize; 2],
+    reach: &Reach,
+    goal: Goal,
+    alike: bool,
     progress: &Progress,
 ) -> Result<Layout, Cancelled> {
     // Highest level still asked about, from each place in the order on.

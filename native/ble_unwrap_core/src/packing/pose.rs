@@ -134,8 +134,10 @@ mod tests {
     fn a_turned_rectangle_is_laid_flat() {
         for angle in [0.0, 0.3, 1.2, 2.0, 3.0, 4.0, 5.5] {
             let turn = nalgebra::Rotation2::new(angle);
-            let points: Vec<_> =
-                [[0.0, 0.0], [5.0, 0.0], [5.0, 2.0], [0.0, 2.0]].iter().map(|&[x, y]| turn * Point2::new(x, y)).collect();
+            let points: Vec<_> = [[0.0, 0.0], [5.0, 0.0], [5.0, 2.0], [0.0, 2.0]]
+                .iter()
+                .map(|&[x, y]| turn * Point2::new(x, y))
+                .collect();
             let [w, h] = size(&points, flat_turn(&outline(&points)));
             assert!((w - 5.0).abs() < 1e-9 && (h - 2.0).abs() < 1e-9, "{w} by {h} at {angle}");
         }

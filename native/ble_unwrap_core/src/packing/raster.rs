@@ -113,8 +113,12 @@ mod tests {
     /// Whether the axis-aligned square [x, x+1] × [y, y+1] grown by e meets a triangle: separating axes.
     fn touches(tri: &[Point2<f64>; 3], x: f64, y: f64, e: f64) -> bool {
         let (lo, hi) = ([x - e, y - e], [x + 1.0 + e, y + 1.0 + e]);
-        let square =
-            [Point2::new(lo[0], lo[1]), Point2::new(hi[0], lo[1]), Point2::new(hi[0], hi[1]), Point2::new(lo[0], hi[1])];
+        let square = [
+            Point2::new(lo[0], lo[1]),
+            Point2::new(hi[0], lo[1]),
+            Point2::new(hi[0], hi[1]),
+            Point2::new(lo[0], hi[1]),
+        ];
         let mut axes = vec![[1.0, 0.0], [0.0, 1.0]];
         for k in 0..3 {
             let d = tri[(k + 1) % 3] - tri[k];
