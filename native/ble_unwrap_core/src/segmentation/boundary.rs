@@ -108,13 +108,7 @@ struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    fn improve(
-        &self,
-        band: f64,
-        crease_weight: f64,
-        label: &mut [u32],
-        progress: &Progress,
-    ) -> Result<(), Cancelled> {
+    fn improve(&self, band: f64, crease_weight: f64, label: &mut [u32], progress: &Progress) -> Result<(), Cancelled> {
         let [a, b] = self.number.map(|n| u32::try_from(n).unwrap_or(0));
         // −1 at the first representative, 0 on the bisector, 1 at the second.
         let balance = |p: usize| {
