@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::quadric::Quadric;
+use super::quadric::{Quadric, initial_quadrics};
 use super::queue::VertexQueue;
 use crate::mesh::measure::area_vector;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
@@ -16,10 +16,6 @@ const LENGTH_WEIGHT: f64 = 1e-3;
 /// Area, in squared edge lengths, that a vertex has at least in the length term, so that slivers
 /// without any area still lose their short edges first.
 const LEAST_AREA: f64 = 1e-3;
-
-/// Weight of the planes that stand on boundary edges, in squared edge lengths. Ten times that of a
-/// face: a boundary shows, and it cannot be mended by a vertex beyond it.
-const BOUNDARY_WEIGHT: f64 = 10.0;
 
 /// Cosine of the angle by which a collapse may turn a face: 60°.
 const LEAST_TURN_COSINE: f64 = 0.5;
@@ -35,7 +31,7 @@ const NO_SHAPE: f64 = 1e-6;
 /// work of one collapse. The hub of a fan stays while its rim is thinned.
 const MOST_NEIGHBOURS: u32 = 32;
 
-/// Candidates tried between two looks at the cancel flag.
+/// Vertices tried between two looks at the cancel flag.
 const CHECK_EVERY: usize = 512;
 
 /// A collapse of one vertex into a neighbour.
@@ -56,16 +52,35 @@ struct FanFace {
     shape: f64,
 }
 
+/// All there is at a vertex, in two cache lines: collapses hop over the mesh, and what they wait for
+/// is memory.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+struct Vertex {
+    /// The position in a box around the origin of half extent 1: quadrics keep their digits.
+    point: Point3<f64>,
+    quadric: Quadric,
+    outgoing: HalfedgeId,
+    neighbour_count: u32,
+    /// Equal to `mark_value` for the neighbours of the vertex at hand.
+    mark: u32,
+    /// The vertex whose collapse cost is the key in the queue. `NONE` if the vertex is not in the
+    /// queue or its key is above its least cost, since that collapse is illegal for now.
+    cheapest: VertexId,
+}
+
+/// The corners of a face and the far sides of its half-edges.
+#[derive(Clone, Debug)]
+struct Face {
+    corner: [VertexId; 3],
+    twin: [HalfedgeId; 3],
+}
+
 /// The connectivity of [`TriMesh`] in the same terms, with faces and vertices removed.
 #[derive(Debug)]
 pub(super) struct Collapsing {
-    /// Positions in a box around the origin of half extent 1: quadrics keep their digits.
-    points: Vec<Point3<f64>>,
-    corner: Vec<VertexId>,
-    twin: Vec<HalfedgeId>,
-    outgoing: Vec<HalfedgeId>,
-    neighbour_count: Vec<u32>,
-    quadrics: Vec<Quadric>,
+    vertices: Vec<Vertex>,
+    faces: Vec<Face>,
     queue: VertexQueue,
     /// The vertex a removed vertex went into; itself while it lives.
     kept: Vec<VertexId>,
@@ -73,27 +88,30 @@ pub(super) struct Collapsing {
     alive: Vec<bool>,
     /// Removed vertices in order.
     removed: Vec<VertexId>,
-    // Of the vertex at hand: faces, neighbours, candidates, and marks on the neighbours.
+    // Of the vertex at hand: faces, neighbours, candidates, and the mark on the neighbours.
     fan: Vec<FanFace>,
     ring: Vec<VertexId>,
     candidates: Vec<Candidate>,
-    mark: Vec<u32>,
     mark_value: u32,
 }
 
 impl Collapsing {
     /// O(n).
-    pub(super) fn new(mesh: &TriMesh) -> Self {
+    pub(super) fn new(mesh: &TriMesh, progress: &Progress) -> Result<Self, Cancelled> {
         let points = normalised(mesh.positions());
-        let quadrics = initial_quadrics(mesh, &points);
-        let n = mesh.vertex_count();
+        let quadrics = initial_quadrics(mesh, &points, progress)?;
+        let vertex = |((v, point), quadric): ((VertexId, Point3<f64>), Quadric)| Vertex {
+            point,
+            quadric,
+            outgoing: mesh.outgoing(v).next().unwrap_or(HalfedgeId::NONE),
+            neighbour_count: mesh.neighbours(v).count() as u32,
+            mark: 0,
+            cheapest: VertexId::NONE,
+        };
+        let face = |f: FaceId| Face { corner: mesh.triangle(f), twin: f.halfedges().map(|h| mesh.twin(h)) };
         let mut collapsing = Self {
-            points,
-            corner: mesh.triangles().iter().flatten().copied().collect(),
-            twin: mesh.halfedges().map(|h| mesh.twin(h)).collect(),
-            outgoing: mesh.vertices().map(|v| mesh.outgoing(v).next().unwrap_or(HalfedgeId::NONE)).collect(),
-            neighbour_count: mesh.vertices().map(|v| mesh.neighbours(v).count() as u32).collect(),
-            quadrics,
+            vertices: mesh.vertices().zip(points).zip(quadrics).map(vertex).collect(),
+            faces: mesh.faces().map(face).collect(),
             queue: VertexQueue::new(std::iter::empty()),
             kept: mesh.vertices().collect(),
             alive: vec![true; mesh.face_count()],
@@ -101,11 +119,12 @@ impl Collapsing {
             fan: Vec::new(),
             ring: Vec::new(),
             candidates: Vec::new(),
-            mark: vec![0; n],
             mark_value: 0,
         };
-        collapsing.queue = VertexQueue::new(mesh.vertices().map(|v| collapsing.least_cost(v)));
-        collapsing
+        progress.check()?;
+        let keys: Vec<Option<f64>> = mesh.vertices().map(|v| collapsing.key(v)).collect();
+        collapsing.queue = VertexQueue::new(keys.into_iter());
+        Ok(collapsing)
     }
 
     /// Collapses the cheapest legal vertex again and again, until `target` vertices are left or no
@@ -120,11 +139,16 @@ impl Collapsing {
             let Some(v) = self.queue.pop() else { break };
             // The key was a lower bound: neighbours may have grown dearer, the cheapest may be illegal.
             // If no collapse is legal, the vertex waits outside until its surroundings change.
-            let Some(candidate) = self.cheapest_legal(v) else { continue };
+            let (found, is_cheapest) = self.cheapest_legal(v);
+            self.at_mut(v).cheapest = VertexId::NONE;
+            let Some(candidate) = found else { continue };
             if self.queue.precedes(v, candidate.cost) {
                 self.collapse(v, candidate);
             } else {
                 self.queue.set(v, Some(candidate.cost));
+                if is_cheapest {
+                    self.at_mut(v).cheapest = candidate.kept;
+                }
             }
         }
         Ok(())
@@ -157,9 +181,9 @@ impl Collapsing {
             place[f.index()] = i;
         }
         let halfedges = || living.iter().flat_map(|f| f.halfedges());
-        let corner: Vec<u32> = halfedges().map(|h| self.corner[h.index()].index() as u32).collect();
+        let corner: Vec<u32> = halfedges().map(|h| self.from(h).index() as u32).collect();
         let twin = halfedges()
-            .map(|h| self.twin[h.index()])
+            .map(|h| self.twin(h))
             .map(|t| if t.is_none() { t } else { FaceId::new(place[t.face().index()]).halfedge(t.slot()) })
             .collect();
         let (mesh, source) = TriMesh::from_glued(&corner, twin, |s| fine.position(VertexId::new(s as usize)));
@@ -167,24 +191,37 @@ impl Collapsing {
     }
 
     fn from(&self, h: HalfedgeId) -> VertexId {
-        self.corner[h.index()]
+        self.faces[h.face().index()].corner[h.slot()]
     }
 
     fn to(&self, h: HalfedgeId) -> VertexId {
-        self.corner[h.next().index()]
+        let slot = h.slot();
+        self.faces[h.face().index()].corner[if slot == 2 { 0 } else { slot + 1 }]
+    }
+
+    fn twin(&self, h: HalfedgeId) -> HalfedgeId {
+        self.faces[h.face().index()].twin[h.slot()]
+    }
+
+    fn at(&self, v: VertexId) -> &Vertex {
+        &self.vertices[v.index()]
+    }
+
+    fn at_mut(&mut self, v: VertexId) -> &mut Vertex {
+        &mut self.vertices[v.index()]
     }
 
     fn is_boundary_vertex(&self, v: VertexId) -> bool {
-        self.twin[self.outgoing[v.index()].index()].is_none()
+        self.twin(self.at(v).outgoing).is_none()
     }
 
     /// Calls `visit` with every half-edge that leaves `v`, counter-clockwise from the boundary.
     fn turn(&self, v: VertexId, mut visit: impl FnMut(HalfedgeId)) {
-        let first = self.outgoing[v.index()];
+        let first = self.at(v).outgoing;
         let mut h = first;
         loop {
             visit(h);
-            h = self.twin[h.prev().index()];
+            h = self.twin(h.prev());
             if h.is_none() || h == first {
                 break;
             }
@@ -192,21 +229,21 @@ impl Collapsing {
     }
 
     fn cost(&self, v: VertexId, kept: VertexId) -> f64 {
-        let (q, p) = (&self.quadrics[v.index()], &self.points[kept.index()]);
-        let squared = (p - self.points[v.index()]).norm_squared();
-        let area = q.area.max(LEAST_AREA * squared);
-        q.at(p) + self.quadrics[kept.index()].at(p) + LENGTH_WEIGHT * squared * area
+        let (gone, kept) = (self.at(v), self.at(kept));
+        let squared = (kept.point - gone.point).norm_squared();
+        let area = gone.quadric.area.max(LEAST_AREA * squared);
+        gone.quadric.at(&kept.point) + kept.quadric.at(&kept.point) + LENGTH_WEIGHT * squared * area
     }
 
     /// Calls `visit` with every collapse of `v` that is not ruled out by `v` alone: a boundary vertex
     /// goes along its boundary only.
     fn each_candidate(&self, v: VertexId, mut visit: impl FnMut(Candidate)) {
-        if self.neighbour_count[v.index()] > MOST_NEIGHBOURS {
+        if self.at(v).neighbour_count > MOST_NEIGHBOURS {
             return;
         }
         let candidate = |edge, kept| Candidate { cost: self.cost(v, kept), edge, kept };
         if self.is_boundary_vertex(v) {
-            let ahead = self.outgoing[v.index()];
+            let ahead = self.at(v).outgoing;
             visit(candidate(ahead, self.to(ahead)));
             let mut last = ahead;
             self.turn(v, |h| last = h);
@@ -216,23 +253,38 @@ impl Collapsing {
         }
     }
 
-    /// A lower bound of the cost of removing `v`.
-    fn least_cost(&self, v: VertexId) -> Option<f64> {
-        let mut least: Option<f64> = None;
-        self.each_candidate(v, |c| least = Some(least.map_or(c.cost, |l| l.min(c.cost))));
-        least
+    /// The least cost of removing `v`, legal or not, after noting whose it is.
+    fn key(&mut self, v: VertexId) -> Option<f64> {
+        let mut least: Option<Candidate> = None;
+        self.each_candidate(v, |c| least = Some(least.filter(|l| l.cost <= c.cost).unwrap_or(c)));
+        self.at_mut(v).cheapest = least.map_or(VertexId::NONE, |l| l.kept);
+        least.map(|l| l.cost)
     }
 
-    /// The cheapest legal collapse of `v`. Leaves the neighbours of `v` in `ring`.
-    fn cheapest_legal(&mut self, v: VertexId) -> Option<Candidate> {
+    /// Brings the key of `v` up to date after its neighbour `gone` went into `kept`.
+    fn update(&mut self, v: VertexId, gone: VertexId, kept: VertexId) {
+        let cheapest = self.at(v).cheapest;
+        if v == kept || [VertexId::NONE, gone, kept].contains(&cheapest) || self.is_boundary_vertex(v) {
+            let key = self.key(v);
+            self.queue.set(v, key);
+        } else if self.queue.lower(v, self.cost(v, kept)) {
+            // The costs of the other collapses are what they were.
+            self.at_mut(v).cheapest = kept;
+        }
+    }
+
+    /// The cheapest legal collapse of `v`, and whether none that is illegal is cheaper. Leaves the
+    /// neighbours of `v` in `ring`.
+    fn cheapest_legal(&mut self, v: VertexId) -> (Option<Candidate>, bool) {
         let mut candidates = std::mem::take(&mut self.candidates);
         candidates.clear();
         self.each_candidate(v, |c| candidates.push(c));
         candidates.sort_unstable_by(|a, b| a.cost.total_cmp(&b.cost).then(a.kept.cmp(&b.kept)));
         self.gather(v);
-        let found = candidates.iter().copied().find(|c| self.keeps_topology(v, c) && self.keeps_shape(v, c.kept));
+        let found = candidates.iter().position(|c| self.keeps_topology(v, c) && self.keeps_shape(v, c.kept));
+        let legal = found.map(|i| candidates[i]);
         self.candidates = candidates;
-        found
+        (legal, found == Some(0))
     }
 
     /// Lists the faces and neighbours of `v` and marks the latter.
@@ -242,17 +294,17 @@ impl Collapsing {
         ring.clear();
         self.turn(v, |h| {
             let ends = [self.to(h), self.from(h.prev())];
-            let p = [v, ends[0], ends[1]].map(|w| self.points[w.index()]);
+            let p = [v, ends[0], ends[1]].map(|w| self.at(w).point);
             let area_vector = area_vector(p);
             fan.push(FanFace { ends, area_vector, shape: shape(p, area_vector.norm()) });
             ring.push(ends[0]);
-            if self.twin[h.prev().index()].is_none() {
+            if self.twin(h.prev()).is_none() {
                 ring.push(ends[1]);
             }
         });
         self.mark_value += 1;
         for w in &ring {
-            self.mark[w.index()] = self.mark_value;
+            self.vertices[w.index()].mark = self.mark_value;
         }
         (self.fan, self.ring) = (fan, ring);
     }
@@ -260,9 +312,9 @@ impl Collapsing {
     /// The link condition (Dey, Edelsbrunner, Guha and Nekhayev 1999) and what it leaves open.
     fn keeps_topology(&self, v: VertexId, candidate: &Candidate) -> bool {
         let Candidate { edge, kept, .. } = *candidate;
-        let across = self.twin[edge.index()];
+        let across = self.twin(edge);
         let faces = if across.is_none() { 1 } else { 2 };
-        let count = |w: VertexId| self.neighbour_count[w.index()];
+        let count = |w: VertexId| self.at(w).neighbour_count;
         if v == kept || count(kept) > MOST_NEIGHBOURS || count(v) + count(kept) > MOST_NEIGHBOURS + faces + 2 {
             return false;
         }
@@ -272,9 +324,9 @@ impl Collapsing {
         }
         if across.is_none() {
             // A loop of three edges is as short as loops get.
-            let second = self.outgoing[self.to(edge).index()];
-            let third = self.outgoing[self.to(second).index()];
-            if second == edge || third == edge || self.outgoing[self.to(third).index()] == edge {
+            let second = self.at(self.to(edge)).outgoing;
+            let third = self.at(self.to(second)).outgoing;
+            if second == edge || third == edge || self.at(self.to(third)).outgoing == edge {
                 return false;
             }
         } else {
@@ -285,10 +337,10 @@ impl Collapsing {
             }
         }
         let mut shared = 0;
-        let mut tally = |w: VertexId| shared += u32::from(self.mark[w.index()] == self.mark_value);
+        let mut tally = |w: VertexId| shared += u32::from(self.at(w).mark == self.mark_value);
         self.turn(kept, |h| {
             tally(self.to(h));
-            if self.twin[h.prev().index()].is_none() {
+            if self.twin(h.prev()).is_none() {
                 tally(self.from(h.prev()));
             }
         });
@@ -300,9 +352,9 @@ impl Collapsing {
         debug_assert!(!self.fan.is_empty(), "{v} has faces");
         let worst = self.fan.iter().map(|f| f.shape).fold(LEAST_SHAPE, f64::min);
         let whole: Vector3<f64> = self.fan.iter().map(|f| f.area_vector).sum();
-        let to = self.points[kept.index()];
+        let to = self.at(kept).point;
         self.fan.iter().filter(|f| !f.ends.contains(&kept)).all(|face| {
-            let p = [to, self.points[face.ends[0].index()], self.points[face.ends[1].index()]];
+            let p = [to, self.at(face.ends[0]).point, self.at(face.ends[1]).point];
             let moved = area_vector(p);
             let before = if face.shape > NO_SHAPE { face.area_vector } else { whole };
             let length = moved.norm();
@@ -314,26 +366,25 @@ impl Collapsing {
     fn collapse(&mut self, v: VertexId, candidate: Candidate) {
         let Candidate { edge, kept, .. } = candidate;
         // The half-edge from v to the kept vertex and the one back, as far as they have faces.
-        let (there, back) =
-            if self.from(edge) == v { (edge, self.twin[edge.index()]) } else { (HalfedgeId::NONE, edge) };
-        let mut outgoing = self.outgoing[kept.index()];
+        let (there, back) = if self.from(edge) == v { (edge, self.twin(edge)) } else { (HalfedgeId::NONE, edge) };
+        let mut outgoing = self.at(kept).outgoing;
         if !there.is_none() && !back.is_none() {
             if outgoing == there.next() || outgoing == back {
-                outgoing = self.twin[there.prev().index()];
+                outgoing = self.twin(there.prev());
             }
         } else if back.is_none() {
             if outgoing == there.next() {
-                outgoing = self.twin[there.prev().index()];
+                outgoing = self.twin(there.prev());
             }
         } else {
             // The kept vertex was the start of this boundary edge and takes over that of v.
-            let ahead = self.outgoing[v.index()];
-            outgoing = if ahead == back.next() { self.twin[back.prev().index()] } else { ahead };
+            let ahead = self.at(v).outgoing;
+            outgoing = if ahead == back.next() { self.twin(back.prev()) } else { ahead };
         }
-        let mut h = self.outgoing[v.index()];
+        let mut h = self.at(v).outgoing;
         for _ in 0..self.fan.len() {
-            self.corner[h.index()] = kept;
-            h = self.twin[h.prev().index()];
+            self.faces[h.face().index()].corner[h.slot()] = kept;
+            h = self.twin(h.prev());
         }
         if !there.is_none() {
             self.remove_face(there.prev(), there.next(), there.prev());
@@ -341,18 +392,17 @@ impl Collapsing {
         if !back.is_none() {
             self.remove_face(back.next(), back.prev(), back.prev());
         }
-        self.outgoing[kept.index()] = outgoing;
+        self.at_mut(kept).outgoing = outgoing;
 
         let faces = 2 - u32::from(there.is_none()) - u32::from(back.is_none());
-        self.neighbour_count[kept.index()] += self.neighbour_count[v.index()];
-        self.neighbour_count[kept.index()] -= faces + 2;
-        let gone = self.quadrics[v.index()];
-        self.quadrics[kept.index()] += gone;
+        let Vertex { quadric, neighbour_count, .. } = *self.at(v);
+        let heir = self.at_mut(kept);
+        heir.quadric += quadric;
+        heir.neighbour_count = heir.neighbour_count + neighbour_count - faces - 2;
         self.kept[v.index()] = kept;
         self.removed.push(v);
         for i in 0..self.ring.len() {
-            let w = self.ring[i];
-            self.queue.set(w, self.least_cost(w));
+            self.update(self.ring[i], v, kept);
         }
     }
 
@@ -360,18 +410,18 @@ impl Collapsing {
     /// removed vertex, to what lies beyond its `still` side. `leaving` leaves the apex.
     fn remove_face(&mut self, moved: HalfedgeId, still: HalfedgeId, leaving: HalfedgeId) {
         let apex = self.from(leaving);
-        let (a, b) = (self.twin[moved.index()], self.twin[still.index()]);
+        let (a, b) = (self.twin(moved), self.twin(still));
         if !a.is_none() {
-            self.twin[a.index()] = b;
+            self.faces[a.face().index()].twin[a.slot()] = b;
         }
         if !b.is_none() {
-            self.twin[b.index()] = a;
+            self.faces[b.face().index()].twin[b.slot()] = a;
         }
-        if self.outgoing[apex.index()] == leaving {
+        if self.at(apex).outgoing == leaving {
             // Of the two sides, the one whose far side runs from the apex.
-            self.outgoing[apex.index()] = if leaving == moved { b } else { a };
+            self.at_mut(apex).outgoing = if leaving == moved { b } else { a };
         }
-        self.neighbour_count[apex.index()] -= 1;
+        self.at_mut(apex).neighbour_count -= 1;
         self.alive[moved.face().index()] = false;
     }
 }
@@ -390,33 +440,4 @@ fn normalised(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
     let half = if half > 0.0 { half } else { 1.0 };
     let centre = 0.5 * low.coords + 0.5 * high.coords;
     points.iter().map(|p| Point3::from((p.coords - centre) / half)).collect()
-}
-
-/// At each vertex a third of its faces' planes, weighted by area, and for boundary edges half of a
-/// plane along the edge perpendicular to the face.
-fn initial_quadrics(mesh: &TriMesh, points: &[Point3<f64>]) -> Vec<Quadric> {
-    let mut quadrics = vec![Quadric::default(); mesh.vertex_count()];
-    for f in mesh.faces() {
-        let p = mesh.triangle(f).map(|v| points[v.index()]);
-        let double_area = area_vector(p);
-        let normal = double_area.try_normalize(0.0);
-        if let Some(n) = normal {
-            let third = double_area.norm() / 6.0;
-            let q = Quadric::plane(n, p[0], third).with_area(third);
-            mesh.triangle(f).iter().for_each(|v| quadrics[v.index()] += q);
-        }
-        for h in f.halfedges().into_iter().filter(|&h| mesh.is_boundary(h)) {
-            let side = p[(h.slot() + 1) % 3] - p[h.slot()];
-            let Some(u) = side.try_normalize(0.0) else { continue };
-            let weight = 0.5 * BOUNDARY_WEIGHT * side.norm_squared();
-            // Beside a face without a normal, whatever leaves the edge's line counts.
-            let q = match normal {
-                Some(n) => Quadric::plane(u.cross(&n), p[h.slot()], weight),
-                None => Quadric::line(u, p[h.slot()], weight),
-            };
-            quadrics[mesh.from(h).index()] += q;
-            quadrics[mesh.to(h).index()] += q;
-        }
-    }
-    quadrics
 }

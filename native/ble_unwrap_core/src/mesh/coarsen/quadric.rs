@@ -2,6 +2,17 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::mesh::TriMesh;
+use crate::mesh::measure::area_vector;
+use crate::progress::{Cancelled, Progress};
+
+/// Weight of the planes that stand on boundary edges, in squared edge lengths. Ten times that of a
+/// face: a boundary shows, and it cannot be mended by a vertex beyond it.
+const BOUNDARY_WEIGHT: f64 = 10.0;
+
+/// Faces read between two looks at the cancel flag.
+const CHECK_EVERY: usize = 4096;
+
 /// A weighted sum of squared distances from a point to planes and lines, and the area it stands for.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Quadric {
@@ -73,6 +84,42 @@ impl std::ops::AddAssign for Quadric {
         self.constant += other.constant;
         self.area += other.area;
     }
+}
+
+/// At each vertex a third of its faces' planes, weighted by area, and for boundary edges half of a
+/// plane along the edge perpendicular to the face.
+pub(super) fn initial_quadrics(
+    mesh: &TriMesh,
+    points: &[Point3<f64>],
+    progress: &Progress,
+) -> Result<Vec<Quadric>, Cancelled> {
+    let mut quadrics = vec![Quadric::default(); mesh.vertex_count()];
+    for f in mesh.faces() {
+        if f.index().is_multiple_of(CHECK_EVERY) {
+            progress.check()?;
+        }
+        let p = mesh.triangle(f).map(|v| points[v.index()]);
+        let double_area = area_vector(p);
+        let normal = double_area.try_normalize(0.0);
+        if let Some(n) = normal {
+            let third = double_area.norm() / 6.0;
+            let q = Quadric::plane(n, p[0], third).with_area(third);
+            mesh.triangle(f).iter().for_each(|v| quadrics[v.index()] += q);
+        }
+        for h in f.halfedges().into_iter().filter(|&h| mesh.is_boundary(h)) {
+            let side = p[(h.slot() + 1) % 3] - p[h.slot()];
+            let Some(u) = side.try_normalize(0.0) else { continue };
+            let weight = 0.5 * BOUNDARY_WEIGHT * side.norm_squared();
+            // Beside a face without a normal, whatever leaves the edge's line counts.
+            let q = match normal {
+                Some(n) => Quadric::plane(u.cross(&n), p[h.slot()], weight),
+                None => Quadric::line(u, p[h.slot()], weight),
+            };
+            quadrics[mesh.from(h).index()] += q;
+            quadrics[mesh.to(h).index()] += q;
+        }
+    }
+    Ok(quadrics)
 }
 
 #[cfg(test)]

@@ -71,6 +71,17 @@ impl VertexQueue {
         }
     }
 
+    /// Lowers the key of a vertex in the queue to `key` if it is higher, and tells whether it was.
+    pub(super) fn lower(&mut self, v: VertexId, key: f64) -> bool {
+        let Some(at) = Some(self.place[v.index()]).filter(|&at| at != ABSENT) else { return false };
+        let lower = entry(v, key) < self.heap[at as usize];
+        if lower {
+            self.heap[at as usize] = entry(v, key);
+            self.rise(at as usize);
+        }
+        lower
+    }
+
     fn settle(&mut self, at: usize) {
         let at = self.rise(at);
         self.sink(at);
@@ -126,6 +137,17 @@ mod tests {
             expected.retain(|e| e.1 as usize != v.index());
             expected.extend(new.map(|k| entry(v, k)));
             queue.set(v, new);
+            let other = VertexId::new((round * 17) % 300);
+            if let Some(old) = expected.iter().copied().find(|e| e.1 as usize == other.index()) {
+                let lower = entry(other, 30.0) < old;
+                assert_eq!(queue.lower(other, 30.0), lower);
+                if lower {
+                    expected.remove(&old);
+                    expected.insert(entry(other, 30.0));
+                }
+            } else {
+                assert!(!queue.lower(other, 0.0), "absent vertices stay absent");
+            }
             if round % 3 == 0 {
                 let least = expected.pop_first().map(|e| e.1 as usize);
                 assert_eq!(queue.pop().map(VertexId::index), least, "round {round}");

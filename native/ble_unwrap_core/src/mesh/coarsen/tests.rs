@@ -213,35 +213,30 @@ fn sides_of_a_thin_sheet_are_not_confused() {
 
 #[test]
 fn degenerate_meshes_are_coarsened_too() {
-    let mut crumpled = fixtures::rectangle(1, 30);
-    let count = crumpled.positions.len();
+    let mut crumpled = fixtures::rectangle(2, 30);
     crumpled.positions.iter_mut().enumerate().for_each(|(i, p)| {
         if i % 3 == 0 {
             *p = [0.25; 3];
         }
     });
-    let flat = |mut m: PolyMesh, to: [f64; 3]| {
-        m = m.moved(|p| [p[0] * to[0], p[1] * to[1], p[2] * to[2]]);
-        m
-    };
+    let scaled = |m: PolyMesh, by: [f64; 3]| m.moved(|p| [p[0] * by[0], p[1] * by[1], p[2] * by[2]]);
     let cases = [
-        ("one point", flat(fixtures::ico_sphere(3), [0.0; 3])),
-        ("a line", flat(fixtures::ico_sphere(3), [1.0, 0.0, 0.0])),
-        ("folded flat", flat(fixtures::ico_sphere(3), [1.0, 1.0, 0.0])),
-        ("huge", flat(fixtures::ico_sphere(3), [1e30; 3])),
+        ("one point", scaled(fixtures::ico_sphere(3), [0.0; 3])),
+        ("a line", scaled(fixtures::ico_sphere(3), [1.0, 0.0, 0.0])),
+        ("folded flat", scaled(fixtures::ico_sphere(3), [1.0, 1.0, 0.0])),
+        ("huge", scaled(fixtures::ico_sphere(3), [1e30; 3])),
         ("needles", fixtures::needles(40, 1e-9)),
         ("caps", fixtures::caps(40, 1e-9)),
         ("fan", fixtures::cone(1.0, 500, 4)),
         ("crumpled", crumpled),
     ];
-    assert!(count > 100);
     for (name, poly) in cases {
         // Without welding: coincident vertices are the point here.
         let points: Vec<_> = poly.positions.iter().map(|&p| Point3::from(Vector3::from(p))).collect();
         let mesh = TriMesh::from_triangles(&points, &poly.triangles()).0;
         for target in [mesh.vertex_count() / 3, 0] {
             let coarse = run(&mesh, target);
-            assert!(coarse.mesh.vertex_count() <= mesh.vertex_count(), "{name}");
+            assert!(coarse.mesh.vertex_count() < mesh.vertex_count(), "{name}");
         }
     }
 }
