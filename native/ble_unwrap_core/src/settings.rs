@@ -104,20 +104,40 @@ impl Settings {
         let positive = "a positive number";
         let unit = "between 0 and 1";
         let checks: [(&'static str, f64, bool, &'static str); 14] = [
-            ("stretch_limit", self.stretch_limit, self.stretch_limit > 1.0 && self.stretch_limit.is_finite(), "above 1"),
-            ("landmark_fraction", g.landmark_fraction, g.landmark_fraction > 0.0 && g.landmark_fraction <= 1.0, "above 0 and at most 1"),
+            (
+                "stretch_limit",
+                self.stretch_limit,
+                self.stretch_limit > 1.0 && self.stretch_limit.is_finite(),
+                "above 1",
+            ),
+            (
+                "landmark_fraction",
+                g.landmark_fraction,
+                g.landmark_fraction > 0.0 && g.landmark_fraction <= 1.0,
+                "above 0 and at most 1",
+            ),
             ("landmark_min", g.landmark_min as f64, g.landmark_min >= 3, "at least 3"),
             ("landmark_max", g.landmark_max as f64, g.landmark_max >= g.landmark_min, "at least landmark_min"),
             ("first_parts", s.first_parts as f64, s.first_parts >= 2, "at least 2"),
             ("later_parts", s.later_parts as f64, s.later_parts >= 2, "at least 2"),
             ("band", s.band, (0.0..=1.0).contains(&s.band), unit),
             ("crease_weight", s.crease_weight, (0.0..=1.0).contains(&s.crease_weight), unit),
-            ("kernel_width", e.kernel_width.unwrap_or(1.0), e.kernel_width.is_none_or(|c| c > 0.0 && c.is_finite()), positive),
+            (
+                "kernel_width",
+                e.kernel_width.unwrap_or(1.0),
+                e.kernel_width.is_none_or(|c| c > 0.0 && c.is_finite()),
+                positive,
+            ),
             ("relaxation", e.relaxation, e.relaxation > 0.0 && e.relaxation < 2.0, "between 0 and 2, both excluded"),
             ("max_sweeps", e.max_sweeps as f64, e.max_sweeps >= 1, "at least 1"),
             ("tolerance", e.tolerance, e.tolerance > 0.0 && e.tolerance < 1.0, unit),
             ("stretch_iterations", t.max_iterations as f64, t.max_iterations >= 1, "at least 1"),
-            ("margin", self.packing.margin_texels, self.packing.margin_texels >= 0.0 && self.packing.margin_texels.is_finite(), "0 or more texels"),
+            (
+                "margin",
+                self.packing.margin_texels,
+                self.packing.margin_texels >= 0.0 && self.packing.margin_texels.is_finite(),
+                "0 or more texels",
+            ),
         ];
         for (name, value, holds, allowed) in checks {
             if !holds {

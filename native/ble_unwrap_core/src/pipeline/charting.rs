@@ -58,8 +58,7 @@ pub(super) fn chart(
     while !open.is_empty() {
         // The largest first, so that no long piece starts last.
         open.sort_by_key(|p| (std::cmp::Reverse(p.patch.faces.len()), p.patch.faces[0]));
-        let steps: Vec<Result<(Step, Rungs), Cancelled>> =
-            open
+        let steps: Vec<Result<(Step, Rungs), Cancelled>> = open
             .par_iter()
             .with_max_len(1)
             .map(|piece| {

@@ -87,8 +87,7 @@ impl Whole {
             return Ok(charting.charts);
         }
         let (mesh, polygon) = (&self.patch.mesh, &self.patch.polygon);
-        let (charts, steps) =
-            merge::merge(mesh, polygon, charting, most_faces, settings, progress)?;
+        let (charts, steps) = merge::merge(mesh, polygon, charting, most_faces, settings, progress)?;
         rungs.add(&steps);
         Ok(charts)
     }
@@ -108,8 +107,7 @@ impl Whole {
         let whole = Whole::new(coarse.mesh, polygon);
         let mut strict = settings.clone();
         strict.stretch_limit = 1.0 + COARSE_ALLOWANCE * (settings.stretch_limit - 1.0);
-        let charts =
-            whole.charts(vec![whole.patch.clone()], usize::MAX, &strict, rungs, &|_| (), progress)?;
+        let charts = whole.charts(vec![whole.patch.clone()], usize::MAX, &strict, rungs, &|_| (), progress)?;
         let mut coarse_label = vec![0; whole.patch.mesh.face_count()];
         for (number, chart) in charts.iter().enumerate() {
             for f in &chart.patch.faces {

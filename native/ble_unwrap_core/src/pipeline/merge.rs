@@ -110,12 +110,7 @@ fn union(mesh: &TriMesh, polygon: &[u32], pool: &[Option<Candidate>], a: usize, 
 }
 
 /// Shared border length of each pair of charts that may still be tested, sorted by pair.
-fn borders(
-    mesh: &TriMesh,
-    owner: &[usize],
-    pool: &[Option<Candidate>],
-    most_faces: usize,
-) -> Vec<(usize, usize, f64)> {
+fn borders(mesh: &TriMesh, owner: &[usize], pool: &[Option<Candidate>], most_faces: usize) -> Vec<(usize, usize, f64)> {
     let faces = |i: usize| pool[i].as_ref().map_or(0, |c| c.chart.patch.faces.len());
     let small = |a: usize, b: usize| faces(a) + faces(b) <= most_faces;
     let open = |i: usize| pool[i].as_ref().is_some_and(|c| c.failures < MOST_FAILURES);
@@ -127,7 +122,8 @@ fn borders(
         let (a, b) = (owner[h.face().index()], owner[t.face().index()]);
         let (a, b) = (a.min(b), a.max(b));
         let refused = || pool[a].as_ref().is_some_and(|c| c.refused.contains(&b));
-        (a != b && b != usize::MAX && small(a, b) && open(a) && open(b) && !refused()).then(|| (a, b, mesh.edge_length(h)))
+        (a != b && b != usize::MAX && small(a, b) && open(a) && open(b) && !refused())
+            .then(|| (a, b, mesh.edge_length(h)))
     };
     let mut sides: Vec<(usize, usize, f64)> = mesh.halfedges().filter_map(shared).collect();
     sides.sort_by_key(|s| (s.0, s.1));

@@ -64,11 +64,8 @@ pub fn unwrap(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -
     progress.enter(Stage::Charts);
     let patches = Patch::components(&surface.mesh, &surface.polygon);
     let tally = Tally::new(progress, surface.mesh.face_count());
-    let made: Vec<Result<(Vec<Chart>, Rungs), Cancelled>> = patches
-        .par_iter()
-        .with_max_len(1)
-        .map(|patch| component::charts(patch, settings, &tally, progress))
-        .collect();
+    let made: Vec<Result<(Vec<Chart>, Rungs), Cancelled>> =
+        patches.par_iter().with_max_len(1).map(|patch| component::charts(patch, settings, &tally, progress)).collect();
     let (mut charts, mut rungs) = (Vec::new(), Rungs::default());
     for component in made {
         let (more, steps) = component?;
