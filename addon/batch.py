@@ -10,6 +10,7 @@ written but a certificate does not hold.
 import argparse
 import hashlib
 import json
+import math
 import os
 import platform
 import sys
@@ -275,15 +276,23 @@ def write_json(path, value):
     path.parent.mkdir(parents=True, exist_ok=True)
     work = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        work.write_text(json.dumps(value, indent=1, default=_plain) + "\n", encoding="utf-8")
+        work.write_text(json.dumps(_plain(value), indent=1, allow_nan=False) + "\n", encoding="utf-8")
         work.replace(path)
     finally:
         work.unlink(missing_ok=True)
 
 
 def _plain(value):
-    """NumPy's scalars and arrays as JSON."""
-    return value.tolist()
+    """A value as JSON can hold it: NumPy's scalars and arrays as numbers, what is not finite as null."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
 
 
 def previous_assets(report, settings):

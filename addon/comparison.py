@@ -30,7 +30,7 @@ def smart_uv(objects, *, margin, texture_size, angle=DEFAULT_ANGLE, map_name=SMA
             angle_limit=math.radians(angle),
             margin_method="FRACTION",
             rotate_method="AXIS_ALIGNED",
-            island_margin=margin / min(texture_size),
+            island_margin=margin / 2 / min(texture_size),  # Blender keeps it around every chart, so twice between two
             area_weight=0.0,
             correct_aspect=True,
             scale_to_bounds=False,

@@ -8,6 +8,8 @@ import numpy as np
 MARGIN_SLACK_TEXELS = 0.01
 STRETCH_SLACK = 1e-3
 
+# Gaps are searched for up to this distance, or twice the margin: what is reported at that value may be larger.
+SEARCHED_TEXELS = 8
 # Settings whose 0 in the panel is the native module's None.
 ZERO_IS_AUTOMATIC = ("landmark_max", "kernel_width")
 
@@ -147,14 +149,31 @@ class Job:
         return _result(_translated(lambda module: self._job.result()))
 
 
-def measure(selection, uv, *, texture_size, margin):
-    """Measures any UVs of a selection, whoever made them; the keys of the native report."""
+def coincident_joined(positions, corner_vertices):
+    """Corner vertices in which vertices at exactly the same place count as one."""
+    order = np.lexsort(positions.T)
+    ordered = positions[order]
+    first = np.ones(len(positions), bool)
+    first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    representative = np.empty(len(positions), np.int32)
+    representative[order] = order[np.maximum.accumulate(np.where(first, np.arange(len(order)), 0))]
+    return representative[corner_vertices]
+
+
+def measure(selection, uv, *, texture_size, margin, weld=True):
+    """Measures any UVs of a selection, whoever made them; the keys of the native report.
+
+    With `weld`, charts run across coincident vertices as they do in `unwrap`: files often split vertices at every face.
+    """
+    corner_vertices = selection.corner_vertices
+    if weld:
+        corner_vertices = coincident_joined(selection.positions, corner_vertices)
     size = texture_size if isinstance(texture_size, int) else tuple(texture_size)
     return dict(
         _translated(
             lambda module: module.measure(
                 selection.positions,
-                selection.corner_vertices,
+                corner_vertices,
                 selection.face_offsets,
                 np.ascontiguousarray(uv, np.float32),
                 corner_triangles=selection.corner_triangles,
@@ -175,7 +194,7 @@ def certify(measured, *, margin, stretch_limit=None, warnings=()):
     if measured.get("unmapped_faces"):
         certificate.violations.append(f"{measured['unmapped_faces']} faces without UVs")
     gap = measured.get("gap_texels")
-    if gap is not None and measured.get("charts", 0) > 1 and gap < margin - MARGIN_SLACK_TEXELS:
+    if gap is not None and np.isfinite(gap) and measured.get("charts", 0) > 1 and gap < margin - MARGIN_SLACK_TEXELS:
         certificate.violations.append(f"charts {gap:.2f} px apart, margin is {margin:g} px")
     worst = measured.get("l2_worst_chart")
     if stretch_limit is not None and worst is not None and worst > stretch_limit + STRETCH_SLACK:
@@ -213,7 +232,8 @@ def lines(certificate, *, margin, stretch_limit):
         ("BAD" if flips else "OK", f"{flips} flipped faces"),
     ]
     if charts > 1 and gap is not None:
-        result.append(("OK" if gap_ok else "BAD", f"Margin {gap:.1f} of {margin:g} px"))
+        least = "≥ " if gap >= max(SEARCHED_TEXELS, 2 * margin) else ""
+        result.append(("OK" if gap_ok else "BAD", f"Charts {least}{gap:.1f} px apart (margin {margin:g})"))
     if unmapped:
         result.append(("BAD", f"{unmapped} faces without UVs"))
     result.append(("INFO", f"{100 * float(measured.get('packing_efficiency') or 0):.1f}% of the texture used"))
@@ -223,4 +243,4 @@ def lines(certificate, *, margin, stretch_limit):
 
 
 def _number(value):
-    return "?" if value is None else f"{float(value):.3f}"
+    return f"{float(value):.3f}" if value is not None and np.isfinite(value) else "?"

@@ -136,7 +136,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
 
     # ---- charts
     weld: BoolProperty(
-        name="Join Coincident Vertices",
+        name="Weld Vertices",
         description="Let charts run across vertices at the same place, as imported files often have; the mesh is kept",
         default=False,
     )

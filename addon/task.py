@@ -86,9 +86,13 @@ class UnwrapTask:
         )
         margin, limit = self.settings["margin"], self.settings["stretch_limit"]
         measured = result.report
-        if measure_again:
-            measured = engine.measure(self.selection, held, texture_size=self.settings["texture_size"], margin=margin)
         warnings = [*self.selection.warnings, *result.report.get("warnings", ())]
+        if measure_again:
+            size, weld = self.settings["texture_size"], self.settings["weld"]
+            try:
+                measured = engine.measure(self.selection, held, texture_size=size, margin=margin, weld=weld)
+            except engine.EngineError as error:  # the UVs are written: say what is known
+                warnings.append(f"The written UVs could not be measured: {error}")
         certificate = engine.certify(measured, margin=margin, stretch_limit=limit, warnings=warnings)
         seconds = time.perf_counter() - self.started
         return Outcome(

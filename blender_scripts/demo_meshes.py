@@ -50,7 +50,7 @@ def sculpt(cells=SCULPT_CELLS, seed=7):
     horns = random.normal(size=(9, 3))
     horns /= np.linalg.norm(horns, axis=1)[:, None]
     for direction, width, height in zip(
-        horns, random.uniform(0.03, 0.16, 9), (0.9, 0.7, 0.6, 0.5, 0.45, -0.25, -0.3, 0.3, -0.2), strict=True
+        horns, random.uniform(0.02, 0.07, 9), (1.5, 1.3, 1.1, 0.9, 0.7, -0.3, -0.35, 0.5, -0.25), strict=True
     ):
         radius += height * np.exp((positions @ direction - 1.0) / width)
     for octave in range(5):

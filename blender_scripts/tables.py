@@ -36,8 +36,8 @@ def table(models):
 
 def caption(name, row):
     """Two short lines about one layout."""
+    charts = f"{row['charts']} chart{'' if row['charts'] == 1 else 's'}"
     return [
         label(name, row),
-        f"{row['charts']} charts, stretch {row['l2']:.3f}, {row['overlaps']} overlaps, "
-        f"{100 * row['packing_efficiency']:.0f}% used",
+        f"{charts}, stretch {row['l2']:.3f}, {row['overlaps']} overlaps, {100 * row['packing_efficiency']:.0f}% used",
     ]

@@ -1,7 +1,9 @@
 """Automatic UV unwrapping under a stretch bound, by Bernoulli logistic embedding."""
 
-from collections.abc import Buffer
+import sys
 from typing import Any, Literal, TypedDict, Unpack, final, type_check_only
+
+from typing_extensions import Buffer  # of collections.abc from Python 3.12 on
 
 __all__ = [
     "Array",
@@ -81,7 +83,8 @@ class Array(Buffer):
     @property
     def format(self) -> str: ...
     def __len__(self) -> int: ...
-    def __buffer__(self, flags: int, /) -> memoryview: ...
+    if sys.version_info >= (3, 12):
+        def __buffer__(self, flags: int, /) -> memoryview: ...
 
 @final
 class Atlas:

@@ -34,6 +34,8 @@ pub struct Settings {
     /// vertices of the input is then a seam only if the result says so. Turn it on for data that
     /// repeats vertices along seams of its own, as many file formats do.
     pub weld: bool,
+    /// Whether large components are cut on a coarse mesh first.
+    pub coarse: bool,
     /// Whether neighbouring charts are joined again where their union stays under the limit.
     pub merge: bool,
     /// Holes of charts.
@@ -60,6 +62,7 @@ impl Default for Settings {
         Self {
             stretch_limit: 1.1,
             weld: false,
+            coarse: true,
             merge: true,
             holes: Holes::Keep,
             chart_scale: ChartScale::Uniform,
@@ -80,6 +83,7 @@ impl Settings {
     pub fn paper() -> Self {
         Self {
             holes: Holes::Cut,
+            coarse: false,
             geodesics: GeodesicSettings::paper(),
             embedding: EmbeddingSettings::paper(),
             stretch: StretchSettings::paper(),

@@ -41,7 +41,7 @@ use crate::unwrap::MeshArrays;
 ///     ``flips`` (triangles), ``overlaps`` and ``overlaps_between`` islands (pairs of triangles; lower bounds unless
 ///     ``overlaps_complete``); ``seam_length`` over the root of the area and ``seam_length_absolute``;
 ///     ``packing_efficiency``, ``gap_texels`` between islands (at most 8 or twice ``margin``; an upper bound unless
-///     ``gap_complete``), ``uv_box``. Where nothing could be measured, NaN.
+///     ``gap_complete``), ``uv_box`` (its lower left and upper right corner). Where nothing could be measured, NaN.
 ///
 /// Raises
 /// ------

@@ -2,6 +2,7 @@
 //!
 //! Knows nothing of charts, UVs or stages.
 
+mod coarsen;
 mod condition;
 mod defects;
 mod ear_clipping;
@@ -17,6 +18,7 @@ mod tri_mesh;
 mod triangulate;
 mod weld;
 
+pub use coarsen::{Coarse, coarsen};
 pub use condition::{ConditionOptions, Surface, condition};
 pub use defects::{Defect, Defects};
 pub use groups::Groups;

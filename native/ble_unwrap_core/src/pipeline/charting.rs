@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::charts::{self, Chart, Patch};
 use crate::geodesics::{self, LandmarkDistances};
 use crate::mesh::Topology;
-use crate::progress::{Cancelled, Progress, Stage};
+use crate::progress::{Cancelled, Progress};
 use crate::segmentation::{self, SpectralAnalysis};
 use crate::settings::{Holes, Settings};
 
@@ -44,25 +44,37 @@ enum Step {
 
 /// Cuts and flattens patches until every chart is under the limit. Rounds over all open pieces, in
 /// parallel; a piece is split into two or more of fewer polygons, so there are at most as many rounds
-/// as polygons, and in practice some ten. Charts come sorted by lowest face.
-pub(super) fn chart(patches: Vec<Patch>, settings: &Settings, progress: &Progress) -> Result<Charting, Cancelled> {
-    let total: usize = patches.iter().map(|p| p.faces.len()).sum();
+/// as polygons, and in practice some ten. `done` is told the faces of each chart as it is accepted. Charts come sorted by lowest face.
+pub(super) fn chart(
+    patches: Vec<Patch>,
+    settings: &Settings,
+    done: &(dyn Fn(f64) + Sync),
+    progress: &Progress,
+) -> Result<Charting, Cancelled> {
     let mut open: Vec<Piece> = patches.into_iter().map(|patch| Piece { patch, splits: 0, family: None }).collect();
     let mut accepted: Vec<(Chart, Option<u32>)> = Vec::new();
     let mut rungs = Rungs::default();
-    let (mut done, mut split_count) = (0, 0);
+    let mut split_count = 0;
     while !open.is_empty() {
         // The largest first, so that no long piece starts last.
         open.sort_by_key(|p| (std::cmp::Reverse(p.patch.faces.len()), p.patch.faces[0]));
-        let steps: Vec<Result<(Step, Rungs), Cancelled>> =
-            open.par_iter().with_max_len(1).map(|piece| step(piece, settings, progress)).collect();
+        let steps: Vec<Result<(Step, Rungs), Cancelled>> = open
+            .par_iter()
+            .with_max_len(1)
+            .map(|piece| {
+                let outcome = step(piece, settings, progress)?;
+                if matches!(outcome.0, Step::Accept(_)) {
+                    done(piece.patch.faces.len() as f64);
+                }
+                Ok(outcome)
+            })
+            .collect();
         let mut next = Vec::new();
         for (piece, taken) in open.iter().zip(steps) {
             let (outcome, steps) = taken?;
             rungs.add(&steps);
             match outcome {
                 Step::Accept(chart) => {
-                    done += chart.patch.faces.len();
                     accepted.push((*chart, piece.family));
                 }
                 Step::Split(patches) => {
@@ -73,7 +85,6 @@ pub(super) fn chart(patches: Vec<Patch>, settings: &Settings, progress: &Progres
             }
         }
         open = next;
-        progress.advance(Stage::Charts, done as f64 / total.max(1) as f64);
     }
     accepted.sort_by_key(|(c, _)| c.patch.faces[0]);
     let (charts, family) = accepted.into_iter().unzip();

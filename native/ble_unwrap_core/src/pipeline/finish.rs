@@ -293,7 +293,7 @@ fn mend(
             }
         }
     }
-    let redone = charting::chart(again, settings, progress)?;
+    let redone = charting::chart(again, settings, &|_| (), progress)?;
     rungs.add(&redone.rungs);
     kept.extend(redone.charts);
     kept.sort_by_key(|c| c.patch.faces.iter().min().copied());

@@ -10,7 +10,7 @@ use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::progress::{Cancelled, Progress};
 use crate::settings::Settings;
 
-use super::charting;
+use super::charting::{self, Charting};
 use super::rungs::{Rung, Rungs};
 
 /// Failed unions a chart may take part in before it is left alone.
@@ -26,27 +26,33 @@ struct Candidate {
 }
 
 /// Joins neighbouring charts, longest shared border over √(smaller area) first, as long as the union
-/// is under the limit. Each chart takes part in at most four failed tests, so the number of tests is
-/// linear in the number of charts. `family[i]` names the split that chart `i` came out of, if its
-/// other half is whole, too: their union has already been refused.
+/// is under the limit and has at most `most_faces` faces. Each chart takes part in at most four failed
+/// tests, so the number of tests is linear in the number of charts. Two halves of a split in two are not
+/// tried: their union has already been refused.
 pub(super) fn merge(
     mesh: &TriMesh,
     polygon: &[u32],
-    charts: Vec<Chart>,
-    family: &[Option<u32>],
+    charting: Charting,
+    most_faces: usize,
     settings: &Settings,
     progress: &Progress,
 ) -> Result<(Vec<Chart>, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
-    let mut pool: Vec<Option<Candidate>> = charts
+    let family = charting.family;
+    let mut pool: Vec<Option<Candidate>> = charting
+        .charts
         .into_iter()
         .map(|chart| Some(Candidate { area: chart.patch.area(), chart, failures: 0, refused: Vec::new() }))
         .collect();
-    for a in 0..pool.len() {
-        let Some(split) = family[a] else { continue };
-        let others = (0..family.len()).filter(|&b| b != a && family[b] == Some(split)).collect();
-        if let Some(c) = &mut pool[a] {
-            c.refused = others;
+    let mut halves: Vec<(u32, usize)> = family.iter().enumerate().filter_map(|(i, f)| Some(((*f)?, i))).collect();
+    halves.sort_unstable();
+    for pair in halves.chunk_by(|a, b| a.0 == b.0) {
+        if let [(_, a), (_, b)] = *pair {
+            for (one, other) in [(a, b), (b, a)] {
+                if let Some(c) = &mut pool[one] {
+                    c.refused.push(other);
+                }
+            }
         }
     }
     let mut owner = vec![usize::MAX; mesh.face_count()];
@@ -57,7 +63,7 @@ pub(super) fn merge(
     }
     loop {
         progress.check()?;
-        let pairs = independent_pairs(&pool, &borders(mesh, &owner, &pool));
+        let pairs = independent_pairs(&pool, &borders(mesh, &owner, &pool, most_faces));
         if pairs.is_empty() {
             break;
         }
@@ -104,7 +110,9 @@ fn union(mesh: &TriMesh, polygon: &[u32], pool: &[Option<Candidate>], a: usize, 
 }
 
 /// Shared border length of each pair of charts that may still be tested, sorted by pair.
-fn borders(mesh: &TriMesh, owner: &[usize], pool: &[Option<Candidate>]) -> Vec<(usize, usize, f64)> {
+fn borders(mesh: &TriMesh, owner: &[usize], pool: &[Option<Candidate>], most_faces: usize) -> Vec<(usize, usize, f64)> {
+    let faces = |i: usize| pool[i].as_ref().map_or(0, |c| c.chart.patch.faces.len());
+    let small = |a: usize, b: usize| faces(a) + faces(b) <= most_faces;
     let open = |i: usize| pool[i].as_ref().is_some_and(|c| c.failures < MOST_FAILURES);
     let shared = |h: HalfedgeId| {
         let t = mesh.twin(h);
@@ -114,7 +122,8 @@ fn borders(mesh: &TriMesh, owner: &[usize], pool: &[Option<Candidate>]) -> Vec<(
         let (a, b) = (owner[h.face().index()], owner[t.face().index()]);
         let (a, b) = (a.min(b), a.max(b));
         let refused = || pool[a].as_ref().is_some_and(|c| c.refused.contains(&b));
-        (a != b && b != usize::MAX && open(a) && open(b) && !refused()).then(|| (a, b, mesh.edge_length(h)))
+        (a != b && b != usize::MAX && small(a, b) && open(a) && open(b) && !refused())
+            .then(|| (a, b, mesh.edge_length(h)))
     };
     let mut sides: Vec<(usize, usize, f64)> = mesh.halfedges().filter_map(shared).collect();
     sides.sort_by_key(|s| (s.0, s.1));

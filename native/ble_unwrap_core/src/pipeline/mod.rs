@@ -6,21 +6,26 @@
 //! 4. Verify the rounded result exactly and measure it.
 
 mod charting;
+mod component;
 mod finish;
 mod flatten;
 mod merge;
 mod rungs;
+mod tally;
 
 use std::time::Instant;
 
-use crate::charts::Patch;
+use rayon::prelude::*;
+
+use crate::charts::{Chart, Patch};
 use crate::error::UnwrapError;
 use crate::mesh::{self, ConditionOptions, MeshInput};
-use crate::progress::{Progress, Stage};
+use crate::progress::{Cancelled, Progress, Stage};
 use crate::report::Report;
 use crate::settings::Settings;
 
 pub use rungs::{Rung, Rungs};
+use tally::Tally;
 
 /// A UV for every corner of the input, and what is known about it.
 #[derive(Clone, Debug)]
@@ -58,16 +63,16 @@ pub fn unwrap(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -
 
     progress.enter(Stage::Charts);
     let patches = Patch::components(&surface.mesh, &surface.polygon);
-    let charting = charting::chart(patches, settings, progress)?;
-    clock.lap("charts");
-    let (mut charts, mut rungs) = (charting.charts, charting.rungs);
-    if settings.merge {
-        let (merged, steps) =
-            merge::merge(&surface.mesh, &surface.polygon, charts, &charting.family, settings, progress)?;
-        charts = merged;
+    let tally = Tally::new(progress, surface.mesh.face_count());
+    let made: Vec<Result<(Vec<Chart>, Rungs), Cancelled>> =
+        patches.par_iter().with_max_len(1).map(|patch| component::charts(patch, settings, &tally, progress)).collect();
+    let (mut charts, mut rungs) = (Vec::new(), Rungs::default());
+    for component in made {
+        let (more, steps) = component?;
+        charts.extend(more);
         rungs.add(&steps);
-        clock.lap("merge");
     }
+    clock.lap("charts");
     finish::finish(input, &surface, charts, rungs, settings, clock, progress)
 }
 
