@@ -12,7 +12,7 @@ use crate::progress::Cancelled;
 pub enum UnwrapError {
     /// The input arrays do not make a mesh.
     #[error(transparent)]
-    Mesh(#[from] MeshError),
+    Mesh(MeshError),
     /// A setting is out of its range.
     #[error("{name} is {value}; it must be {allowed}")]
     Setting {
@@ -25,11 +25,30 @@ pub enum UnwrapError {
     },
     /// The charts cannot be packed as asked.
     #[error(transparent)]
-    Pack(#[from] PackError),
+    Pack(PackError),
     /// The result does not fit the checks, which take 2³⁰ triangles.
     #[error(transparent)]
     Check(#[from] UvMeshError),
     /// The caller asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl From<MeshError> for UnwrapError {
+    fn from(error: MeshError) -> Self {
+        // A stop is a stop, whichever stage it came in.
+        match error {
+            MeshError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Mesh(other),
+        }
+    }
+}
+
+impl From<PackError> for UnwrapError {
+    fn from(error: PackError) -> Self {
+        match error {
+            PackError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Pack(other),
+        }
+    }
 }
