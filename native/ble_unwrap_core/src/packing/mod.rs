@@ -281,7 +281,6 @@ pub fn pack(items: &[PackItem<'_>], settings: &PackSettings, progress: &Progress
     for ((outline, shape), placed) in outlines.iter().zip(&best.shapes).zip(&best.layout.placed) {
         let pose = match placed {
             Some(at) => grid.to_texture(shape.footprints[at.footprint].pose(at.x, at.y)),
-            Some(at) => shape.footprints[at.footprint].pose(at.x, at.y, grid.cell, 0.5 * settings.margin_texels),
             // Only items without triangles are not placed.
             None => Pose { cos: 1.0, sin: 0.0, centre: outline.centre, scale: best.density, offset: middle },
         };
