@@ -138,7 +138,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     weld: BoolProperty(
         name="Weld Vertices",
         description="Let charts run across vertices at the same place, as imported files often have; the mesh is kept",
-        default=True,
+        default=False,
     )
     merge: BoolProperty(
         name="Merge Charts",

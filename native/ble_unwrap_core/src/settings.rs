@@ -30,7 +30,9 @@ pub enum ChartScale {
 pub struct Settings {
     /// Upper bound of the L2 stretch of every chart, above 1.
     pub stretch_limit: f64,
-    /// Whether coincident vertices are joined before charting.
+    /// Whether vertices at exactly the same position count as one. Off by default: an edge between two
+    /// vertices of the input is then a seam only if the result says so. Turn it on for data that
+    /// repeats vertices along seams of its own, as many file formats do.
     pub weld: bool,
     /// Whether large components are cut on a coarse mesh first.
     pub coarse: bool,
@@ -59,7 +61,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             stretch_limit: 1.1,
-            weld: true,
+            weld: false,
             coarse: true,
             merge: true,
             holes: Holes::Keep,

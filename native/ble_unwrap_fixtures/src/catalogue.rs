@@ -116,7 +116,7 @@ static CASES: [Case; 53] = [
     Case::new("projective plane", Facts::one_sided(), || projective_plane(3)),
     Case::new("bow-tie", Facts::manifold(2, 2, 0), bow_tie),
     Case::new("checkerboard", Facts::manifold(128, 128, 0), || checkerboard(16)),
-    Case::new("book of 60 pages", Facts { components: Some(59), ..Facts::branching(1) }, || book(60)),
+    Case::new("book of 60 pages", Facts { components: Some(60), ..Facts::branching(1) }, || book(60)),
     Case::new("fin", Facts { components: Some(2), loops: Some(2), genus: Some(0), ..Facts::branching(8) }, || fin(8)),
     Case::new(
         "cubes that share an edge",

@@ -58,8 +58,9 @@ impl Sides<'_> {
     /// Pairs up the sides.
     ///
     /// Two sides at an edge are glued, whatever their directions. Of more than two, opposed pairs
-    /// are glued from the flattest dihedral angle on (at equal angles a convex edge first), or the
-    /// flattest pair of one direction if no two are opposed. Sides that share their vertices in the
+    /// are glued from the flattest dihedral angle on (at equal angles a convex edge first); none of
+    /// one direction, because where more than two faces meet only the winding tells which belong
+    /// together. Sides that share their vertices in the
     /// input come before sides that only weld together: welding adds edges and never takes one
     /// away. Never glued: two sides of one polygon, seams, a side from a vertex to itself, and
     /// faces that lie on one another unless they share vertices and oppose. O(n log n).
@@ -144,7 +145,7 @@ impl Sides<'_> {
 
     /// Pairs up more than two sides, in ascending order, at one edge.
     fn glue_crowd(&self, sides: &[u32], welded: bool, glued: &mut Glued) {
-        let (pairs, same_direction) = self.crowd_pairs(sides, welded);
+        let pairs = self.crowd_pairs(sides, welded);
         let before = glued.links.len();
         let mut taken = vec![false; sides.len()];
         for [a, b] in pairs {
@@ -153,7 +154,7 @@ impl Sides<'_> {
                 && !taken[j]
             {
                 (taken[i], taken[j]) = (true, true);
-                glued.links.push(Link { sides: [a.min(b), a.max(b)], same_direction });
+                glued.links.push(Link { sides: [a.min(b), a.max(b)], same_direction: false });
             }
         }
         // Layers that merely lie on one another are not an edge of several faces.
@@ -164,39 +165,28 @@ impl Sides<'_> {
         glued.severed.extend(sides);
     }
 
-    /// Pairs to glue at an edge with more than two sides, best first, and whether both sides of each
-    /// run the same way. A side may occur in several.
-    fn crowd_pairs(&self, sides: &[u32], welded: bool) -> (Vec<[u32; 2]>, bool) {
+    /// Opposed pairs to glue at an edge with more than two sides, best first. A side may occur in several.
+    fn crowd_pairs(&self, sides: &[u32], welded: bool) -> Vec<[u32; 2]> {
         let start = self.start(sides[0], welded);
         let (along, against): (Vec<u32>, Vec<u32>) = sides.iter().partition(|&&s| self.start(s, welded) == start);
         if sides.len() > MOST_COMPARED {
             let pairs = along.iter().zip(&against).map(|(&a, &b)| [a, b]);
-            return (pairs.filter(|&pair| self.may_meet(pair, false)).collect(), false);
+            return pairs.filter(|&pair| self.may_meet(pair, false)).collect();
         }
-        let opposed = along.iter().flat_map(|&a| against.iter().map(move |&b| [a, b]));
-        let pairs = self.by_flatness(opposed, false);
-        if !pairs.is_empty() {
-            return (pairs, false);
-        }
-        let within = |list: &[u32]| -> Vec<[u32; 2]> {
-            list.iter().enumerate().flat_map(|(i, &a)| list[i + 1..].iter().map(move |&b| [a, b])).collect()
-        };
-        let mut pairs = self.by_flatness([within(&along), within(&against)].into_iter().flatten(), true);
-        pairs.truncate(1);
-        (pairs, true)
+        self.by_flatness(along.iter().flat_map(|&a| against.iter().map(move |&b| [a, b])))
     }
 
-    /// The pairs that may be glued, flattest first, at equal angles convex ones, then by corner.
-    fn by_flatness(&self, pairs: impl Iterator<Item = [u32; 2]>, same_direction: bool) -> Vec<[u32; 2]> {
+    /// The opposed pairs that may be glued, flattest first, at equal angles convex ones, then by corner.
+    fn by_flatness(&self, pairs: impl Iterator<Item = [u32; 2]>) -> Vec<[u32; 2]> {
         // Angles that differ by rounding count as equal.
         const STEPS: f64 = 1e6;
         let mut ranked: Vec<(i64, bool, [u32; 2])> = pairs
-            .filter(|&pair| self.may_meet(pair, same_direction))
+            .filter(|&pair| self.may_meet(pair, false))
             .map(|[a, b]| {
                 let (na, nb) = (self.normal(a), self.normal(b));
                 let [from, to] = self.polygons.side(a as usize);
                 let reflex = na.cross(&nb).dot(&(self.points[to] - self.points[from])) < 0.0;
-                let bend = -self.cosine([a, b], same_direction) * STEPS;
+                let bend = -self.cosine([a, b], false) * STEPS;
                 (bend.round() as i64, reflex, [a, b])
             })
             .collect();

@@ -25,3 +25,4 @@ pub use groups::Groups;
 pub use index::{FaceId, HalfedgeId, VertexId};
 pub use input::{MeshError, MeshInput};
 pub use tri_mesh::{Topology, TriMesh};
+pub(crate) use weld::weld;

@@ -6,7 +6,7 @@ use rayon::slice::ParallelSliceMut;
 ///
 /// Positions are equal when every coordinate is, with −0 equal to 0; no tolerance, so that nothing
 /// depends on scale. Vertices that are not `used` stand for themselves. O(n log n).
-pub(super) fn weld(positions: &[[f64; 3]], used: &[bool]) -> Vec<u32> {
+pub(crate) fn weld(positions: &[[f64; 3]], used: &[bool]) -> Vec<u32> {
     // Adding 0 turns −0 into 0; equal numbers then have equal bits.
     let mut keyed: Vec<([u64; 3], u32)> = (0..positions.len())
         .filter(|&v| used[v])

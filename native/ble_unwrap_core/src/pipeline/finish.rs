@@ -7,7 +7,7 @@ use nalgebra::{Point2, Point3};
 use crate::charts::{Chart, Patch};
 use crate::distortion;
 use crate::error::UnwrapError;
-use crate::mesh::{FaceId, MeshInput, Surface, measure};
+use crate::mesh::{self, FaceId, MeshInput, Surface, measure};
 use crate::metrics::{self, Texture, UvMesh, UvMeshError};
 use crate::packing::{self, PackItem, Packed};
 use crate::progress::{Cancelled, Progress, Stage};
@@ -18,11 +18,22 @@ use crate::settings::{ChartScale, Settings};
 use crate::verify::{self, Certificate};
 
 use super::rungs::{Rung, Rungs};
-use super::{Atlas, Clock, charting};
+use super::{Atlas, Clock, charting, flatten};
 
 /// Rounds of packing, checking and mending. Needles that rounding breaks are gone after one; the rest
 /// is for charts whose parts break again.
-const MOST_ROUNDS: usize = 6;
+const MOST_ROUNDS: usize = 12;
+/// From this round on a faulty chart comes apart into single polygons, which always do.
+const LAST_RESORT: usize = 9;
+/// A chart of less area than this times the square of its longest edge is drawn with that.
+const LEAST_AREA: f64 = 1e-12;
+/// And one without any extent with this. Packing makes it a texel.
+const NO_AREA: f64 = 1e-30;
+/// The least height, as a share of the whole surface's size, that the triangles of a polygon on a
+/// circle are to have: a dozen steps of single precision.
+const LEAST_HEIGHT: f64 = 1e-6;
+/// And the extent up to which such a polygon may be enlarged for it.
+const MOST_EXTENT: f64 = 0.02;
 /// Texel densities of charts differ by no more than this from uniform, either way.
 const MOST_SCALE: f64 = 2.0;
 
@@ -36,7 +47,7 @@ pub(super) fn finish(
     mut clock: Clock,
     progress: &Progress,
 ) -> Result<Atlas, UnwrapError> {
-    let arrays = Arrays::new(input, surface);
+    let arrays = Arrays::new(input, surface, settings.weld);
     let mut round = 0;
     loop {
         progress.enter(Stage::Pack);
@@ -45,7 +56,8 @@ pub(super) fn finish(
         clock.lap("pack");
         progress.enter(Stage::Verify);
         let mesh = arrays.uv_mesh(&layout, settings)?;
-        let certificate = verify::verify(&mesh, &surface.reversed, progress)?;
+        // The corners are listed as the surface winds its faces: none is reversed to them.
+        let certificate = verify::verify(&mesh, &[], progress)?;
         let faulty: BTreeSet<usize> =
             certificate.faulty_charts.iter().filter_map(|&c| usize::try_from(c).ok()).collect();
         round += 1;
@@ -61,7 +73,14 @@ pub(super) fn finish(
             progress.enter(Stage::Done);
             return Ok(Atlas { uv: layout.uv, chart: layout.polygon_chart, report });
         }
-        charts = mend(surface, charts, &faulty, &layout, &mut rungs, settings, progress)?;
+        charts = mend(
+            surface,
+            charts,
+            &Faults { round, faulty: &faulty, broken: &layout.broken },
+            &mut rungs,
+            settings,
+            progress,
+        )?;
         clock.lap("mend");
     }
 }
@@ -72,11 +91,15 @@ fn scale(charts: &mut [Chart], settings: &Settings) {
         let mesh = &chart.patch.mesh;
         let corners = |f| mesh.triangle(f).map(|v| chart.uv[v.index()]);
         let flat: f64 = mesh.faces().map(|f| 0.5 * distortion::signed_double_area(corners(f))).sum();
-        let area = chart.patch.area();
-        if !(flat > 0.0 && area > 0.0) {
+        let longest = mesh.halfedges().map(|h| mesh.edge_length(h)).fold(0.0, f64::max);
+        let area = chart.patch.area().max(LEAST_AREA * longest * longest).max(NO_AREA);
+        if !(flat > 0.0 && flat.is_finite()) {
             continue;
         }
         let mut factor = (area / flat).sqrt();
+        if chart.patch.is_one_polygon() && mesh.face_count() > 1 {
+            factor *= enlargement(chart, factor);
+        }
         if settings.chart_scale == ChartScale::Stretch {
             factor *= chart.l2.sqrt().clamp(1.0 / MOST_SCALE, MOST_SCALE);
         }
@@ -84,6 +107,20 @@ fn scale(charts: &mut [Chart], settings: &Settings) {
             *p *= factor;
         }
     }
+}
+
+/// By how much a polygon of many corners must grow for its triangles to survive single precision.
+fn enlargement(chart: &Chart, factor: f64) -> f64 {
+    let mesh = &chart.patch.mesh;
+    let (mut height, mut extent) = (f64::INFINITY, 0.0f64);
+    for f in mesh.faces() {
+        let [a, b, c] = mesh.triangle(f).map(|v| chart.uv[v.index()]);
+        let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+        height = height.min(distortion::signed_double_area([a, b, c]) / longest);
+        extent = extent.max(longest);
+    }
+    let wanted = (LEAST_HEIGHT / (factor * height)).min(MOST_EXTENT / (factor * extent));
+    if wanted.is_finite() { wanted.max(1.0) } else { 1.0 }
 }
 
 /// The input as one list of triangles, for the checks.
@@ -94,14 +131,18 @@ struct Arrays {
 }
 
 impl Arrays {
-    fn new(input: &MeshInput<'_>, surface: &Surface) -> Self {
+    /// `weld` as the surface was made with it, so that edges count as seams where it has them.
+    fn new(input: &MeshInput<'_>, surface: &Surface, weld: bool) -> Self {
         let corner_triangles: Vec<[u32; 3]> = surface.corner.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
         let vertex = |c: u32| u32::try_from(input.corner_vertices[c as usize]).unwrap_or(0);
-        Self {
-            positions: input.positions.iter().map(|&p| Point3::from(p)).collect(),
-            triangles: corner_triangles.iter().map(|c| c.map(vertex)).collect(),
-            corner_triangles,
+        let mut triangles: Vec<[u32; 3]> = corner_triangles.iter().map(|c| c.map(vertex)).collect();
+        if weld {
+            let mut used = vec![false; input.positions.len()];
+            triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
+            let representative = mesh::weld(input.positions, &used);
+            triangles.iter_mut().flatten().for_each(|v| *v = representative[*v as usize]);
         }
+        Self { positions: input.positions.iter().map(|&p| Point3::from(p)).collect(), triangles, corner_triangles }
     }
 
     fn uv_mesh<'a>(&'a self, layout: &'a Layout, settings: &Settings) -> Result<UvMesh<'a>, UvMeshError> {
@@ -169,7 +210,7 @@ impl Layout {
 }
 
 fn pack(charts: &[Chart], settings: &Settings, progress: &Progress) -> Result<Packed, UnwrapError> {
-    let index = |v: crate::mesh::VertexId| u32::try_from(v.index()).unwrap_or(u32::MAX);
+    let index = |v: mesh::VertexId| u32::try_from(v.index()).unwrap_or(u32::MAX);
     let triangles: Vec<Vec<[u32; 3]>> =
         charts.iter().map(|c| c.patch.mesh.triangles().iter().map(|t| t.map(index)).collect()).collect();
     let items: Vec<PackItem<'_>> =
@@ -187,29 +228,58 @@ fn diagonal(surface: &Surface) -> f64 {
     if surface.mesh.vertex_count() == 0 { 0.0 } else { (high - low).norm() }
 }
 
-/// Polygons with broken faces become charts of their own; charts that overlap after rounding are
-/// halved. What is left of a chart is flattened anew.
+/// What the checks of one round found.
+struct Faults<'a> {
+    /// The number of the round, from 1.
+    round: usize,
+    /// Charts that break a rule.
+    faulty: &'a BTreeSet<usize>,
+    /// Faces that rounding turned over, with their chart.
+    broken: &'a [(usize, FaceId)],
+}
+
+/// Polygons with broken faces become charts of their own, thickened if they are already. A chart that
+/// overlaps itself after rounding is flattened anew with its boundary held apart, or halved. What is
+/// left of a chart is flattened anew.
 fn mend(
     surface: &Surface,
     charts: Vec<Chart>,
-    faulty: &BTreeSet<usize>,
-    layout: &Layout,
+    faults: &Faults<'_>,
     rungs: &mut Rungs,
     settings: &Settings,
     progress: &Progress,
 ) -> Result<Vec<Chart>, Cancelled> {
     let mut separate: Vec<(usize, u32)> =
-        layout.broken.iter().map(|&(chart, face)| (chart, surface.polygon[face.index()])).collect();
+        faults.broken.iter().map(|&(chart, face)| (chart, surface.polygon[face.index()])).collect();
     separate.sort_unstable();
     separate.dedup();
     let mut kept = Vec::new();
     let mut again = Vec::new();
     for (number, chart) in charts.into_iter().enumerate() {
-        let broken: Vec<u32> = separate.iter().filter(|s| s.0 == number).map(|s| s.1).collect();
-        let patch = Patch::of_surface(&surface.mesh, &surface.polygon, sorted(&chart.patch.faces));
-        if patch.is_one_polygon() || (broken.is_empty() && !faulty.contains(&number)) {
+        let first = separate.partition_point(|s| s.0 < number);
+        let mut broken: Vec<u32> = separate[first..].iter().take_while(|s| s.0 == number).map(|s| s.1).collect();
+        if broken.is_empty() && !faults.faulty.contains(&number) {
             kept.push(chart);
-        } else if broken.is_empty() {
+            continue;
+        }
+        if chart.patch.is_one_polygon() {
+            rungs.take(Rung::Thicken);
+            kept.push(flatten::thicken_polygon(&chart.patch, faults.round > 2).into_chart(chart.patch));
+            continue;
+        }
+        if broken.is_empty() && faults.round == 1 {
+            if let Some(flat) = flatten::flatten_apart(&chart.patch, settings, rungs, progress)? {
+                kept.push(flat.into_chart(chart.patch));
+                continue;
+            }
+        }
+        let patch = Patch::of_surface(&surface.mesh, &surface.polygon, sorted(&chart.patch.faces));
+        if faults.round >= LAST_RESORT {
+            broken.clone_from(&patch.polygon);
+            broken.sort_unstable();
+            broken.dedup();
+        }
+        if broken.is_empty() {
             rungs.take(Rung::Bisect);
             let halves = segmentation::bisect(&patch.mesh, &patch.polygon);
             again.extend(patch.split(&halves.label, halves.parts));

@@ -18,6 +18,11 @@ use super::rungs::{Rung, Rungs};
 /// visibly there although its L2, an average, is fine.
 const MOST_P99_STRETCH: f64 = 4.0;
 
+/// An isometry has no more L2 stretch than this; half a degree between normals alone gives 1.0001,
+/// half a per cent of strain 1.006. What is above has folded away area that lies in thin faces.
+const ISOMETRIC: f64 = 1.01;
+/// Height (the whole surface has area 1) up to which a face's lengths are rounding.
+const NEGLIGIBLE: f64 = 1e-8;
 /// A start without flips that is stretched more than this is not worth minimising: of the trials on a model
 /// with many holes, where starts are worst, none that began above 3 came under an L2 of 1.1.
 const HOPELESS_START: f64 = 4.0;
@@ -46,8 +51,18 @@ pub(super) fn isometric(patch: &Patch, rungs: &mut Rungs) -> Option<Flat> {
     if stretch::first_flip(mesh, &uv).is_some() || !stretch::boundary_is_simple(mesh, &uv) {
         return None;
     }
+    let l2 = l2(patch, &rest, &uv);
+    if l2 > ISOMETRIC {
+        return None;
+    }
     rungs.take(rung);
-    Some(Flat { l2: stretch::l2_stretch(mesh, &rest, &uv), uv })
+    Some(Flat { uv, l2 })
+}
+
+/// L2 stretch of the surface as it is; of the thickened rest triangles where it has no area.
+fn l2(patch: &Patch, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
+    let true_l2 = stretch::l2_of_positions(&patch.mesh, uv, NEGLIGIBLE);
+    if true_l2.is_nan() { stretch::l2_stretch(&patch.mesh, rest, uv) } else { true_l2 }
 }
 
 /// Flattens a patch of genus 0 with a boundary by embedding and stretch minimisation. `None` where the
@@ -77,6 +92,41 @@ pub(super) fn flatten_polygon(
         return Ok(flat);
     }
     rungs.take(Rung::TutteCircle);
+    Ok(on_a_circle(patch))
+}
+
+/// Flattens a chart's patch anew so that its boundary keeps its distance from itself: from Tutte's
+/// embedding, under the barrier. `None` where that is over the limit.
+pub(super) fn flatten_apart(
+    patch: &Patch,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Progress,
+) -> Result<Option<Flat>, Cancelled> {
+    let trial = Trial { patch, rest: RestTriangle::of_mesh(&patch.mesh), settings, progress };
+    recover(trial.flatten_apart(Some(settings.stretch_limit), rungs))
+}
+
+/// A patch that is one polygon, too thin or too small for single precision: a triangle at least a
+/// thousandth as high as long, and if that was not enough or for more corners a regular polygon.
+/// Whatever the polygon, no triangle of it is close to degenerate.
+pub(super) fn thicken_polygon(patch: &Patch, was_not_enough: bool) -> Flat {
+    if patch.mesh.face_count() > 1 || was_not_enough {
+        return on_a_circle(patch);
+    }
+    let rest = RestTriangle::of_mesh(&patch.mesh);
+    let mut uv = vec![Point2::origin(); patch.mesh.vertex_count()];
+    for (f, r) in patch.mesh.faces().zip(&rest) {
+        for (v, p) in patch.mesh.triangle(f).iter().zip(r.corners()) {
+            uv[v.index()] = p;
+        }
+    }
+    Flat { l2: l2(patch, &rest, &uv), uv }
+}
+
+/// A triangulated polygon with its corners evenly on a circle: strictly convex, so no triangle is
+/// flipped or degenerate.
+fn on_a_circle(patch: &Patch) -> Flat {
     let loops = patch.mesh.boundary_loops();
     let mut uv = vec![Point2::origin(); patch.mesh.vertex_count()];
     for corners in loops.iter().take(1) {
@@ -85,7 +135,7 @@ pub(super) fn flatten_polygon(
             uv[patch.mesh.from(*h).index()] = Point2::new(angle.cos(), angle.sin());
         }
     }
-    Ok(Flat { l2: stretch::l2_stretch(&patch.mesh, &trial.rest, &uv), uv })
+    Flat { l2: l2(patch, &RestTriangle::of_mesh(&patch.mesh), &uv), uv }
 }
 
 struct Trial<'a> {
@@ -116,20 +166,25 @@ impl Trial<'_> {
             }
             let Some((uv, l2)) = self.minimise(&uv, limit, false)? else { return Ok(None) };
             if stretch::boundary_is_simple(mesh, &uv) {
-                return Ok(self.judge(uv, l2, limit));
+                return Ok(self.judge(uv, limit));
             }
             if limit.is_some_and(|limit| l2 > limit) {
                 return Ok(None);
             }
         }
         // The free boundary ran over itself: start without overlap and keep it so.
+        self.flatten_apart(limit, rungs)
+    }
+
+    fn flatten_apart(&self, limit: Option<f64>, rungs: &mut Rungs) -> Result<Option<Flat>, StretchError> {
+        let mesh = &self.patch.mesh;
         let boundary = TutteBoundary::Circle;
         let Some(circle) = stretch::tutte_embedding(mesh, &self.rest, boundary, self.progress)? else {
             return Ok(None);
         };
         rungs.take(Rung::TutteCircle);
-        let Some((uv, l2)) = self.minimise(&circle, limit, true)? else { return Ok(None) };
-        Ok(if stretch::boundary_is_simple(mesh, &uv) { self.judge(uv, l2, limit) } else { None })
+        let Some((uv, _)) = self.minimise(&circle, limit, true)? else { return Ok(None) };
+        Ok(if stretch::boundary_is_simple(mesh, &uv) { self.judge(uv, limit) } else { None })
     }
 
     /// The paper's step: landmarks by likelihood, the rest by regression. `None` where the distances
@@ -159,7 +214,8 @@ impl Trial<'_> {
         Ok((!best.abandoned).then_some((best.uv, best.l2)))
     }
 
-    fn judge(&self, uv: Vec<Point2<f64>>, l2: f64, limit: Option<f64>) -> Option<Flat> {
+    fn judge(&self, uv: Vec<Point2<f64>>, limit: Option<f64>) -> Option<Flat> {
+        let l2 = l2(self.patch, &self.rest, &uv);
         let good = limit.is_none_or(|limit| l2 <= limit && self.p99_stretch(&uv) <= MOST_P99_STRETCH);
         good.then_some(Flat { uv, l2 })
     }

@@ -25,12 +25,14 @@ pub enum Rung {
     Bisect,
     /// Faces that rounding to single precision would have flipped became charts of their own.
     Separate,
+    /// A polygon too thin or too small for single precision was drawn thicker.
+    Thicken,
     /// Two charts joined to one.
     Merge,
 }
 
 impl Rung {
-    const ALL: [Self; 12] = [
+    const ALL: [Self; 13] = [
         Self::Plane,
         Self::Unfold,
         Self::Embedding,
@@ -42,6 +44,7 @@ impl Rung {
         Self::Split,
         Self::Bisect,
         Self::Separate,
+        Self::Thicken,
         Self::Merge,
     ];
 
@@ -60,6 +63,7 @@ impl Rung {
             Self::Split => "split",
             Self::Bisect => "bisect",
             Self::Separate => "separate",
+            Self::Thicken => "thicken",
             Self::Merge => "merge",
         }
     }

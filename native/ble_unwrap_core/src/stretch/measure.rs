@@ -47,6 +47,38 @@ pub fn l2_stretch(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> 
     (energy * plane_area(mesh, uv)).sqrt() / surface_area(rest)
 }
 
+/// L2 stretch as [`l2_stretch`], but of the positions of the vertices themselves: no triangle is made thicker.
+///
+/// Faces of a height up to `negligible` over their longest edge are left out: their lengths are
+/// rounding. NaN if no face is left; infinite where a face that counts has no area in the plane. O(n).
+///
+/// # Panics
+/// If there is not one point a vertex.
+#[must_use]
+pub fn l2_of_positions(mesh: &TriMesh, uv: &[Point2<f64>], negligible: f64) -> f64 {
+    assert_eq!(uv.len(), mesh.vertex_count(), "a point a vertex");
+    let (mut energy, mut surface, mut plane) = (0.0, 0.0, 0.0);
+    for f in mesh.faces() {
+        let [p, q, r] = mesh.triangle_positions(f);
+        let (e1, e2) = (q - p, r - p);
+        let double_area = e1.cross(&e2).norm();
+        let longest = e1.norm().max(e2.norm()).max((r - q).norm());
+        if double_area <= negligible * longest || double_area.is_nan() {
+            continue;
+        }
+        let [a, b, c] = mesh.triangle(f).map(|v| uv[v.index()]);
+        let (d1, d2) = (b - a, c - a);
+        let determinant = d1.perp(&d2);
+        // Squared Frobenius norm of the map from the plane to the surface.
+        let squared_norm = (e1 * d2.norm() - e2 * d1.norm()).norm_squared()
+            + 2.0 * e1.dot(&e2) * (d1.norm() * d2.norm() - d1.dot(&d2));
+        energy += 0.25 * double_area * squared_norm / (determinant * determinant);
+        surface += 0.5 * double_area;
+        plane += 0.5 * determinant;
+    }
+    (energy * plane).sqrt() / surface
+}
+
 /// L-infinity stretch of a chart scaled to equal area: the greatest 1/σ₂ of its faces times √(ΣA₂/ΣA₃). At
 /// least 1 for a chart without flips; infinite where a face has no area. O(n).
 ///
@@ -86,6 +118,17 @@ mod tests {
     use nalgebra::Point3;
 
     #[test]
+    fn needles_count_as_they_are() {
+        // Too thin for a rest triangle; laid down twice as wide.
+        let mesh = grid(1, 1, |x, y| Point3::new(x, 1e-5 * y, 0.0));
+        let rest = RestTriangle::of_mesh(&mesh);
+        let uv: Vec<_> = mesh.positions().iter().map(|p| Point2::new(p.x, 2.0 * p.y)).collect();
+        assert!(l2_stretch(&mesh, &rest, &uv) > 5.0);
+        assert!((l2_of_positions(&mesh, &uv, 1e-8) - 1.25_f64.sqrt()).abs() < 1e-9);
+        assert!(l2_of_positions(&mesh, &uv, 1e-4).is_nan());
+    }
+
+    #[test]
     fn measures_of_a_known_map_do_not_depend_on_scale() {
         let mesh = grid(4, 3, |x, y| Point3::new(x, y, 0.0));
         let rest = RestTriangle::of_mesh(&mesh);
@@ -98,6 +141,8 @@ mod tests {
             rescale_to_equal_area(&mesh, &rest, &mut uv);
             assert!((plane_area(&mesh, &uv) - 12.0).abs() < 1e-12);
         }
+        let uv: Vec<_> = mesh.positions().iter().map(|p| Point2::new(2.0 * p.x + 0.3 * p.y, 0.5 * p.y)).collect();
+        assert!((l2_of_positions(&mesh, &uv, 1e-8) - l2_stretch(&mesh, &rest, &uv)).abs() < 1e-12);
         let uv = vec![Point2::origin(); mesh.vertex_count()];
         assert!(!l2_stretch(&mesh, &rest, &uv).is_finite());
     }
