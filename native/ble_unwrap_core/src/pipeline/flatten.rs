@@ -8,6 +8,7 @@ use crate::charts::{Chart, Patch};
 use crate::distortion::{self, RestTriangle};
 use crate::embedding::{self, EmbeddingError};
 use crate::geodesics::LandmarkDistances;
+use crate::mesh::FaceId;
 use crate::progress::{Cancelled, Progress};
 use crate::settings::Settings;
 use crate::stretch::{self, Injective, MinimiseOptions, StretchError, TutteBoundary};
@@ -23,6 +24,9 @@ const MOST_P99_STRETCH: f64 = 4.0;
 const ISOMETRIC: f64 = 1.01;
 /// Height (the whole surface has area 1) up to which a face's lengths are rounding.
 const NEGLIGIBLE: f64 = 1e-8;
+/// An embedding folded over more of its area than this is near no flat map. Of 598 trials on three
+/// development models 275 were above; 7 of these ended under the limit, after most of the time spent on all.
+const MOST_FOLDED: f64 = 0.25;
 /// A start without flips that is stretched more than this is not worth minimising: of the trials on a model
 /// with many holes, where starts are worst, none that began above 3 came under an L2 of 1.1.
 const HOPELESS_START: f64 = 4.0;
@@ -154,6 +158,9 @@ impl Trial<'_> {
     ) -> Result<Option<Flat>, StretchError> {
         let mesh = &self.patch.mesh;
         if let Some(start) = self.embed(distances)? {
+            if limit.is_some() && self.folded_share(&start) > MOST_FOLDED {
+                return Ok(None);
+            }
             let (uv, how) = stretch::make_injective(mesh, &self.rest, &start, self.progress)?;
             rungs.take(match how {
                 Injective::AlreadyWas => Rung::Embedding,
@@ -201,6 +208,14 @@ impl Trial<'_> {
         }
     }
 
+    /// Share of the surface that a map turns over.
+    fn folded_share(&self, uv: &[Point2<f64>]) -> f64 {
+        let mesh = &self.patch.mesh;
+        let flipped = |f: &FaceId| distortion::signed_double_area(mesh.triangle(*f).map(|v| uv[v.index()])) <= 0.0;
+        let area = |f: FaceId| self.rest[f.index()].area();
+        mesh.faces().filter(flipped).map(area).sum::<f64>() / stretch::surface_area(&self.rest)
+    }
+
     /// `None` if it was given up.
     fn minimise(
         &self,
@@ -223,7 +238,7 @@ impl Trial<'_> {
     /// The stretch that 99 % of the area stays under, with the chart at the area of its surface.
     fn p99_stretch(&self, uv: &[Point2<f64>]) -> f64 {
         let mesh = &self.patch.mesh;
-        let squared = |f: crate::mesh::FaceId| {
+        let squared = |f: FaceId| {
             let corners = mesh.triangle(f).map(|v| uv[v.index()]);
             distortion::squared_stretch(&self.rest[f.index()].jacobian(corners))
         };
