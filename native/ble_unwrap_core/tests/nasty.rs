@@ -2,7 +2,7 @@
 
 use ble_unwrap_core::mesh::{ConditionOptions, MeshInput, condition};
 use ble_unwrap_core::metrics::{Measures, Texture, UvMesh, measure};
-use ble_unwrap_core::{Atlas, Certificate, Progress, Settings, unwrap, verify};
+use ble_unwrap_core::{Atlas, Certificate, ChartScale, Holes, Progress, Settings, unwrap, verify};
 use ble_unwrap_fixtures::{FlatPolygons, PolyMesh, book, catalogue, fin, grid, ico_sphere, sculpt_like, soup, torus};
 use nalgebra::Point3;
 use proptest::prelude::*;
@@ -95,6 +95,37 @@ fn every_kind_of_mesh_gets_a_proven_atlas() {
     for case in catalogue() {
         let (_, measures) = unwrapped(&(case.build)(), &Settings::default(), case.name);
         assert_eq!(measures.uv_degenerate_faces, 0, "{}", case.name);
+    }
+}
+
+#[test]
+fn other_settings_keep_the_same_promises() {
+    let some = [
+        "crumpled grid",
+        "annulus",
+        "icosahedron",
+        "torus with a hole",
+        "projective plane",
+        "faces listed twice",
+        "spiral ramp",
+        "needles",
+        "caps",
+        "comb",
+        "keyhole",
+        "checkerboard",
+    ];
+    let mut wide = Settings { chart_scale: ChartScale::Stretch, holes: Holes::Cut, ..Settings::default() };
+    (wide.packing.width, wide.packing.height, wide.packing.margin_texels) = (2048, 256, 3.0);
+    let mut large = Settings { merge: false, stretch_limit: 1.02, ..Settings::default() };
+    (large.packing.width, large.packing.height, large.packing.margin_texels) = (16_384, 16_384, 8.0);
+    let mut small = Settings { stretch_limit: 3.0, weld: false, ..Settings::default() };
+    (small.packing.width, small.packing.height, small.packing.margin_texels) = (96, 96, 0.5);
+    let mut settings = vec![("wide", wide), ("large", large), ("small", small), ("paper", Settings::paper())];
+    settings[3].1.stretch.max_iterations = 5;
+    for case in catalogue().filter(|c| some.contains(&c.name)) {
+        for (name, settings) in &settings {
+            unwrapped(&(case.build)(), settings, &format!("{}, {name}", case.name));
+        }
     }
 }
 

@@ -1,0 +1,80 @@
+//! What the unwrapper makes of a few meshes, within tolerances: a table to notice when quality moves.
+//!
+//! No UVs are compared. Where a change is an improvement, change the row.
+
+use ble_unwrap_core::{MeshInput, Progress, Settings, unwrap};
+use ble_unwrap_fixtures::catalogue;
+
+/// A mesh of the catalogue and what is expected of it.
+struct Row {
+    name: &'static str,
+    /// Fewest and most charts.
+    charts: [usize; 2],
+    /// Greatest L2 stretch of the worst chart.
+    worst: f64,
+    /// Greatest length of the seams over √area.
+    seams: f64,
+    /// Least covered share of the texture.
+    efficiency: f64,
+}
+
+const fn row(name: &'static str, charts: [usize; 2], worst: f64, seams: f64, efficiency: f64) -> Row {
+    Row { name, charts, worst, seams, efficiency }
+}
+
+static ROWS: [Row; 17] = [
+    row("flat grid", [1, 1], 1.000_001, 0.0, 0.94),
+    row("bumpy grid", [1, 1], 1.02, 0.0, 0.70),
+    row("disc", [1, 1], 1.000_001, 0.0, 0.73),
+    row("L shape", [1, 1], 1.000_001, 0.0, 0.70),
+    row("annulus", [1, 1], 1.000_001, 0.0, 0.61),
+    row("cap of 40 degrees", [1, 1], 1.02, 0.0, 0.70),
+    row("hemisphere", [1, 1], 1.03, 0.0, 0.73),
+    row("icosphere", [2, 2], 1.03, 2.06, 0.53),
+    row("open cylinder", [1, 1], 1.000_001, 0.76, 0.43),
+    row("capped cylinder", [2, 2], 1.10, 2.61, 0.55),
+    row("cone", [2, 2], 1.000_001, 1.86, 0.60),
+    row("torus", [1, 1], 1.04, 1.89, 0.39),
+    row("plate with five holes", [1, 1], 1.06, 4.10, 0.30),
+    row("Moebius strip", [1, 1], 1.001, 0.34, 0.15),
+    row("Klein bottle", [1, 1], 1.04, 1.90, 0.55),
+    row("face", [1, 1], 1.04, 0.0, 0.73),
+    row("small sculpt", [2, 9], 1.1, 5.37, 0.43),
+];
+
+#[test]
+fn quality_is_what_it_was() {
+    let mut moved = Vec::new();
+    for row in &ROWS {
+        let case = catalogue().find(|c| c.name == row.name).expect("a mesh of the catalogue");
+        let mesh = (case.build)();
+        let flat = mesh.flat();
+        let input = MeshInput {
+            positions: &mesh.positions,
+            corner_vertices: &flat.corner_vertices,
+            face_offsets: &flat.face_offsets,
+            corner_triangles: None,
+            seams: &[],
+        };
+        let report = unwrap(&input, &Settings::default(), &Progress::new()).expect("unwraps").report;
+        let good = (row.charts[0]..=row.charts[1]).contains(&report.charts)
+            && (report.flips, report.overlaps, report.charts_over_limit.len()) == (0, 0, 0)
+            && report.l2_worst_chart <= row.worst
+            && report.seam_length <= row.seams
+            && report.packing_efficiency >= row.efficiency;
+        if !good {
+            moved.push(format!(
+                "{}: {} charts, worst {}, seams {}, efficiency {}, {} flips, {} overlaps, {} over the limit",
+                row.name,
+                report.charts,
+                report.l2_worst_chart,
+                report.seam_length,
+                report.packing_efficiency,
+                report.flips,
+                report.overlaps,
+                report.charts_over_limit.len()
+            ));
+        }
+    }
+    assert!(moved.is_empty(), "{}", moved.join("\n"));
+}
