@@ -26,7 +26,7 @@ impl Default for GeodesicSettings {
     /// The paper's fraction, kept between 48 (fewer lose accuracy on small charts) and 160 (more
     /// gain nothing measurable on large ones).
     fn default() -> Self {
-        Self { metric: Metric::FastMarching, landmark_fraction: 0.01, landmark_min: 48, landmark_max: 160 }
+        Self { metric: Metric::FastMarching, landmark_fraction: 0.01, landmark_min: 48, landmark_max: 64 }
     }
 }
 

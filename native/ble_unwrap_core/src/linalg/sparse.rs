@@ -5,6 +5,7 @@ use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
+use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side, Spec};
 use thiserror::Error;
@@ -127,8 +128,13 @@ impl SparseCholesky {
     pub fn analyse(pattern: SparsePattern) -> Result<Self, SparseError> {
         let n = pattern.size();
         let a = SymbolicSparseColMatRef::new_checked(n, n, &pattern.column_start, None, &pattern.row);
+        // The 2×2 blocks of a map's Hessian make dense panels even in small charts.
+        let params = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..CholeskySymbolicParams::default()
+        };
         let symbolic =
-            factorize_symbolic_cholesky(a, Side::Upper, SymmetricOrdering::Amd, CholeskySymbolicParams::default())
+            factorize_symbolic_cholesky(a, Side::Upper, SymmetricOrdering::Amd, params)
                 .map_err(|_: FaerError| SparseError::TooLarge)?;
         let buffer = |req| MemBuffer::try_new(req).map_err(|_| SparseError::TooLarge);
         let factor_scratch = buffer(symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()))?;

@@ -178,8 +178,10 @@ impl<'a> Attempt<'a> {
         let diagonal = |h| patch.is_diagonal(h);
         if self.topology.genus() > 0 && self.settings.holes == Holes::Keep {
             let open = patch.cut(&charts::cut_open(&patch.mesh, length, diagonal));
-            if let Some(chart) = self.run_cut(open, rungs)? {
-                return Ok(Some(chart));
+            let is_disk = open.mesh.topology().is_disk();
+            let chart = self.run_cut(open, rungs)?;
+            if chart.is_some() || is_disk {
+                return Ok(chart);
             }
         }
         self.run_cut(patch.cut(&charts::cut_to_disk(&patch.mesh, length, diagonal)), rungs)

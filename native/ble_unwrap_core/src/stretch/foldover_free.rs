@@ -17,7 +17,7 @@ use crate::progress::Progress;
 
 /// Newton steps at most. Starts that resemble the surface take 3 to 35; vertices scattered at random are not
 /// untangled in 120 either, and Tutte's embedding serves them sooner.
-const MAX_ITERATIONS: usize = 60;
+const MAX_ITERATIONS: usize = 40;
 /// Armijo's constant.
 const ARMIJO: f64 = 1e-4;
 /// Halvings before a step is given up.
