@@ -20,10 +20,10 @@ const COARSE_ABOVE: usize = 3_000;
 const COARSE_SHARE: f64 = 0.05;
 /// and never fewer or more than these. Below, features of the size of a chart's width vanish; above, the trials
 /// cost more than the fine flattening.
-const COARSE_VERTICES: (usize, usize) = (1_500, 6_000);
+const COARSE_VERTICES: (usize, usize) = (1_500, 4_000);
 /// On the coarse mesh the stretch above 1 must stay under this share of what the limit allows: detail
 /// that the collapse removed adds some.
-const COARSE_ALLOWANCE: f64 = 0.85;
+const COARSE_ALLOWANCE: f64 = 0.6;
 /// Sides by which a border may move on the fine mesh: about two edges of the coarse one at the usual
 /// ratio of one vertex in twenty.
 const BAND_RINGS: usize = 10;
