@@ -2,10 +2,10 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
+use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side, Spec};
 use thiserror::Error;
@@ -133,9 +133,8 @@ impl SparseCholesky {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..CholeskySymbolicParams::default()
         };
-        let symbolic =
-            factorize_symbolic_cholesky(a, Side::Upper, SymmetricOrdering::Amd, params)
-                .map_err(|_: FaerError| SparseError::TooLarge)?;
+        let symbolic = factorize_symbolic_cholesky(a, Side::Upper, SymmetricOrdering::Amd, params)
+            .map_err(|_: FaerError| SparseError::TooLarge)?;
         let buffer = |req| MemBuffer::try_new(req).map_err(|_| SparseError::TooLarge);
         let factor_scratch = buffer(symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default()))?;
         let solve_scratch = buffer(symbolic.solve_in_place_scratch::<f64>(MAX_COLUMNS, Par::Seq))?;
