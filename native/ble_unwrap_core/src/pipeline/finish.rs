@@ -267,11 +267,12 @@ fn mend(
             kept.push(flatten::thicken_polygon(&chart.patch, faults.round > 2).into_chart(chart.patch));
             continue;
         }
-        if broken.is_empty() && faults.round == 1 {
-            if let Some(flat) = flatten::flatten_apart(&chart.patch, settings, rungs, progress)? {
-                kept.push(flat.into_chart(chart.patch));
-                continue;
-            }
+        if broken.is_empty()
+            && faults.round == 1
+            && let Some(flat) = flatten::flatten_apart(&chart.patch, settings, rungs, progress)?
+        {
+            kept.push(flat.into_chart(chart.patch));
+            continue;
         }
         let patch = Patch::of_surface(&surface.mesh, &surface.polygon, sorted(&chart.patch.faces));
         if faults.round >= LAST_RESORT {

@@ -11,7 +11,7 @@ use crate::geodesics::LandmarkDistances;
 use crate::mesh::FaceId;
 use crate::progress::{Cancelled, Progress};
 use crate::settings::Settings;
-use crate::stretch::{self, Injective, MinimiseOptions, StretchError, TutteBoundary};
+use crate::stretch::{self, Injective, MinimiseOptions, Minimised, StretchError, TutteBoundary};
 
 use super::rungs::{Rung, Rungs};
 
@@ -171,7 +171,7 @@ impl Trial<'_> {
             if limit.is_some() && stretch::l2_stretch(mesh, &self.rest, &uv) > HOPELESS_START {
                 return Ok(None);
             }
-            let Some((uv, l2)) = self.minimise(&uv, limit, false)? else { return Ok(None) };
+            let Some(Minimised { uv, l2, .. }) = self.minimise(&uv, limit, false)? else { return Ok(None) };
             if stretch::boundary_is_simple(mesh, &uv) {
                 return Ok(self.judge(uv, limit));
             }
@@ -190,7 +190,7 @@ impl Trial<'_> {
             return Ok(None);
         };
         rungs.take(Rung::TutteCircle);
-        let Some((uv, _)) = self.minimise(&circle, limit, true)? else { return Ok(None) };
+        let Some(Minimised { uv, .. }) = self.minimise(&circle, limit, true)? else { return Ok(None) };
         Ok(if stretch::boundary_is_simple(mesh, &uv) { self.judge(uv, limit) } else { None })
     }
 
@@ -222,11 +222,11 @@ impl Trial<'_> {
         start: &[Point2<f64>],
         abandon_above: Option<f64>,
         keep_boundary_simple: bool,
-    ) -> Result<Option<(Vec<Point2<f64>>, f64)>, StretchError> {
+    ) -> Result<Option<Minimised>, StretchError> {
         let options = MinimiseOptions { abandon_above, keep_boundary_simple, seed: self.seed() };
         let (mesh, settings) = (&self.patch.mesh, &self.settings.stretch);
         let best = stretch::minimise_stretch(mesh, &self.rest, start, settings, &options, self.progress)?;
-        Ok((!best.abandoned).then_some((best.uv, best.l2)))
+        Ok((!best.abandoned).then_some(best))
     }
 
     fn judge(&self, uv: Vec<Point2<f64>>, limit: Option<f64>) -> Option<Flat> {
