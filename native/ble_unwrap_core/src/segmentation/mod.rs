@@ -10,7 +10,7 @@
 //! 4. Boundaries: a minimum cut in a band around each border, drawn to creases and to short lines.
 //! 5. Repair: parts become connected, fragments go to a neighbour.
 //!
-//! [`straighten`] redraws borders that come from a coarser mesh.
+//! [`straighten()`] redraws borders that come from a coarser mesh.
 //!
 //! Polygons stay whole. The result is a label a face; each label is connected over polygon sides.
 

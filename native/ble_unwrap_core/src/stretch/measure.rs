@@ -69,10 +69,12 @@ pub fn l2_of_positions(mesh: &TriMesh, uv: &[Point2<f64>], negligible: f64) -> f
         let [a, b, c] = mesh.triangle(f).map(|v| uv[v.index()]);
         let (d1, d2) = (b - a, c - a);
         let determinant = d1.perp(&d2);
-        // Squared Frobenius norm of the map from the plane to the surface.
-        let squared_norm = (e1 * d2.norm() - e2 * d1.norm()).norm_squared()
-            + 2.0 * e1.dot(&e2) * (d1.norm() * d2.norm() - d1.dot(&d2));
-        energy += 0.25 * double_area * squared_norm / (determinant * determinant);
+        // The map from the plane to the surface, both with their first edge as axis: triangular, so
+        // that a needle's height is not lost among its lengths.
+        let (x, u) = (e1.norm(), d1.norm());
+        let shear = (e1.dot(&e2) / x - x / u * (d1.dot(&d2) / u)) / (determinant / u);
+        let squared_norm = (x / u).powi(2) + shear.powi(2) + (double_area / x / (determinant / u)).powi(2);
+        energy += 0.25 * double_area * squared_norm;
         surface += 0.5 * double_area;
         plane += 0.5 * determinant;
     }
