@@ -9,6 +9,8 @@ import bpy
 INPUT_FORMATS = ("blend", "obj", "glb", "gltf", "ply", "stl", "fbx")
 OUTPUT_FORMATS = ("blend", "glb", "obj", "fbx", "ply")
 # Formats that cannot be written, or hold no UVs, become another one.
+# Formats that keep a vertex once for each of its normals and UVs.
+SPLIT_FORMATS = ("glb", "gltf", "ply", "stl")
 DEFAULT_OUTPUT = {"gltf": "glb", "stl": "glb"}
 
 

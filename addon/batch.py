@@ -180,6 +180,8 @@ def process(source, target, settings, arguments):
     asset = {"in": str(source), "out": None, "status": "failed", "error": None, "summary": "", "objects": []}
     started = time.perf_counter()
     try:
+        # These formats split vertices wherever normals or UVs differ.
+        settings = {"weld": asset_io.file_format(source) in asset_io.SPLIT_FORMATS, **settings}
         objects = asset_io.load(source)
         with_faces = [obj for obj in mesh_bridge.unique_meshes(objects) if obj.data.polygons]
         if not with_faces:

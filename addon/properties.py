@@ -19,6 +19,7 @@ PAPER_VALUES = {
     "landmark_min": 3,
     "landmark_max": 0,
     "holes": "CUT",
+    "coarse": False,
     "stretch_solver": "LINE_SEARCH",
     "stretch_iterations": 60,
     "margin": 2.0,
@@ -140,6 +141,11 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         description="Let charts run across vertices at the same place, as imported files often have; the mesh is kept",
         default=False,
     )
+    coarse: BoolProperty(
+        name="Coarse Mesh",
+        description="Decide on a coarse copy where to cut large pieces of surface, which is many times faster",
+        default=True,
+    )
     merge: BoolProperty(
         name="Merge Charts",
         description="Join neighbouring charts again where their union stays within the stretch limit",
@@ -201,7 +207,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     landmark_max: IntProperty(
         name="At Most",
         description="Most landmarks of a chart; 0 sets no bound",
-        default=160,
+        default=64,
         min=0,
         max=100_000,
         soft_max=2000,
@@ -303,7 +309,7 @@ BRIDGE_SETTINGS = ("use_seams", "use_selection", "uv_map", "uv_map_name", "use_o
 MAIN_SETTINGS = ("stretch_limit", "texture_size", "margin", "rotation", "use_seams", "use_selection")
 ADVANCED_SETTINGS = (
     ("Result", ("uv_map", "uv_map_name", "use_original_bounds", "mark_seams")),
-    ("Charts", ("weld", "merge", "holes", "chart_scale", "seed")),
+    ("Charts", ("weld", "coarse", "merge", "holes", "chart_scale", "seed")),
     ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max")),
     ("Embedding", ("model", "kernel_width", "relaxation", "max_sweeps", "tolerance", "update", "initial")),
     ("Stretch", ("stretch_solver", "stretch_iterations")),

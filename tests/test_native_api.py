@@ -259,7 +259,7 @@ def test_defaults_are_those_of_the_design():
         "geodesics": "fast_marching",
         "landmark_fraction": 0.01,
         "landmark_min": 48,
-        "landmark_max": 160,
+        "landmark_max": 64,
         "model": "default",
         "relaxation": 1.6,
         "max_sweeps": 60,

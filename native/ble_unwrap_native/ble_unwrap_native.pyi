@@ -67,6 +67,7 @@ class _PackSettings(_MeasureSettings, total=False):
 class _Settings(_GeodesicSettings, _EmbeddingSettings, _PackSettings, total=False):
     stretch_limit: float
     weld: bool
+    coarse: bool
     merge: bool
     holes: Literal["keep", "cut"]
     chart_scale: Literal["uniform", "stretch"]

@@ -130,6 +130,7 @@ const ALL: &[Function] = &[Function::Embed, Function::GeodesicDistances, Functio
 const TABLE: &[Setting] = &[
     row("stretch_limit", Field::Real(|c| &mut c.settings.stretch_limit, Interval::above(1.0, 1e3)), UNWRAP),
     row("weld", Field::Flag(|c| &mut c.settings.weld), UNWRAP),
+    row("coarse", Field::Flag(|c| &mut c.settings.coarse), UNWRAP),
     row("merge", Field::Flag(|c| &mut c.settings.merge), UNWRAP),
     row("holes", Field::Word(|c| &mut c.settings.holes), UNWRAP),
     row("chart_scale", Field::Word(|c| &mut c.settings.chart_scale), UNWRAP),

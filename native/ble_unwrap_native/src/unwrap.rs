@@ -121,6 +121,8 @@ fn start(job: &Job, mesh: MeshArrays, call: Call) -> PyResult<()> {
 ///     Upper bound of the L2 stretch of every chart. 1 is isometric; the default is 1.1.
 /// weld : bool
 ///     Whether vertices at the same position count as one.
+/// coarse : bool
+///     Whether large pieces of surface are cut into charts on a coarse mesh first, which is many times faster.
 /// merge : bool
 ///     Whether charts are joined again where their union stays under the limit.
 /// holes : {"keep", "cut"}
