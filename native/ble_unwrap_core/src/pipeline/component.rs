@@ -10,9 +10,10 @@ use crate::progress::{Cancelled, Progress};
 use crate::segmentation;
 use crate::settings::Settings;
 
+use super::charting;
+use super::merge::{self, Which};
 use super::rungs::Rungs;
 use super::tally::Tally;
-use super::{charting, merge};
 
 /// Components of more vertices are charted on a coarse mesh.
 const COARSE_ABOVE: usize = 3_000;
@@ -27,8 +28,8 @@ const COARSE_ALLOWANCE: f64 = 0.6;
 /// Sides by which a border may move on the fine mesh: about two edges of the coarse one at the usual
 /// ratio of one vertex in twenty.
 const BAND_RINGS: usize = 10;
-/// On the fine mesh only charts that are small together are joined: large ones have been tried on the
-/// coarse mesh, and a trial costs what flattening them did.
+/// On the fine mesh only charts that a split there has made are joined again, and only small ones: the others
+/// have been tried on the coarse mesh, and a trial costs what flattening them did.
 const FINE_UNION: usize = 6_000;
 /// Share of the work on a component that the coarse mesh takes.
 const COARSE_WORK: f64 = 0.4;
@@ -47,10 +48,10 @@ pub(super) fn charts(
         let parts = fine.parts_by_coarse_mesh(settings, &mut rungs, progress)?;
         tally.add(size, COARSE_WORK);
         let done = |faces| tally.add(faces, 1.0 - COARSE_WORK);
-        fine.charts(parts, FINE_UNION, settings, &mut rungs, &done, progress)?
+        fine.charts(parts, Which::AfterSplits { most_faces: FINE_UNION }, settings, &mut rungs, &done, progress)?
     } else {
         let parts = vec![fine.patch.clone()];
-        fine.charts(parts, usize::MAX, settings, &mut rungs, &|faces| tally.add(faces, 1.0), progress)?
+        fine.charts(parts, Which::All, settings, &mut rungs, &|faces| tally.add(faces, 1.0), progress)?
     };
     for f in charts.iter_mut().flat_map(|c| &mut c.patch.faces) {
         *f = patch.faces[f.index()];
@@ -70,12 +71,11 @@ impl Whole {
         Self { patch: Patch { mesh, faces, vertices, polygon } }
     }
 
-    /// Charts parts of this mesh and joins them again where they need not be apart, up to
-    /// `most_faces` faces.
+    /// Charts parts of this mesh and joins them again where they need not be apart.
     fn charts(
         &self,
         parts: Vec<Patch>,
-        most_faces: usize,
+        which: Which,
         settings: &Settings,
         rungs: &mut Rungs,
         done: &(dyn Fn(f64) + Sync),
@@ -87,7 +87,7 @@ impl Whole {
             return Ok(charting.charts);
         }
         let (mesh, polygon) = (&self.patch.mesh, &self.patch.polygon);
-        let (charts, steps) = merge::merge(mesh, polygon, charting, most_faces, settings, progress)?;
+        let (charts, steps) = merge::merge(mesh, polygon, charting, which, settings, progress)?;
         rungs.add(&steps);
         Ok(charts)
     }
@@ -107,7 +107,7 @@ impl Whole {
         let whole = Whole::new(coarse.mesh, polygon);
         let mut strict = settings.clone();
         strict.stretch_limit = 1.0 + COARSE_ALLOWANCE * (settings.stretch_limit - 1.0);
-        let charts = whole.charts(vec![whole.patch.clone()], usize::MAX, &strict, rungs, &|_| (), progress)?;
+        let charts = whole.charts(vec![whole.patch.clone()], Which::All, &strict, rungs, &|_| (), progress)?;
         let mut coarse_label = vec![0; whole.patch.mesh.face_count()];
         for (number, chart) in charts.iter().enumerate() {
             for f in &chart.patch.faces {

@@ -16,24 +16,44 @@ use super::rungs::{Rung, Rungs};
 /// Failed unions a chart may take part in before it is left alone.
 const MOST_FAILURES: usize = 4;
 
+/// Which neighbours are tried.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Which {
+    /// All.
+    All,
+    /// Only those of which one came out of a split, and which have so few faces together.
+    AfterSplits {
+        /// Most faces of a union.
+        most_faces: usize,
+    },
+}
+
 /// A chart and its history.
 struct Candidate {
     chart: Chart,
     area: f64,
     failures: usize,
+    /// Came out of a split, or of joining a chart that did.
+    split: bool,
     /// Charts (by index) whose union with this one is known to be over the limit.
     refused: Vec<usize>,
 }
 
+impl Candidate {
+    fn new(chart: Chart, split: bool) -> Self {
+        Self { area: chart.patch.area(), chart, failures: 0, split, refused: Vec::new() }
+    }
+}
+
 /// Joins neighbouring charts, longest shared border over √(smaller area) first, as long as the union
-/// is under the limit and has at most `most_faces` faces. Each chart takes part in at most four failed
+/// is under the limit. Each chart takes part in at most four failed
 /// tests, so the number of tests is linear in the number of charts. Two halves of a split in two are not
 /// tried: their union has already been refused.
 pub(super) fn merge(
     mesh: &TriMesh,
     polygon: &[u32],
     charting: Charting,
-    most_faces: usize,
+    which: Which,
     settings: &Settings,
     progress: &Progress,
 ) -> Result<(Vec<Chart>, Rungs), Cancelled> {
@@ -42,7 +62,8 @@ pub(super) fn merge(
     let mut pool: Vec<Option<Candidate>> = charting
         .charts
         .into_iter()
-        .map(|chart| Some(Candidate { area: chart.patch.area(), chart, failures: 0, refused: Vec::new() }))
+        .zip(&family)
+        .map(|(chart, family)| Some(Candidate::new(chart, family.is_some())))
         .collect();
     let mut halves: Vec<(u32, usize)> = family.iter().enumerate().filter_map(|(i, f)| Some(((*f)?, i))).collect();
     halves.sort_unstable();
@@ -63,7 +84,7 @@ pub(super) fn merge(
     }
     loop {
         progress.check()?;
-        let pairs = independent_pairs(&pool, &borders(mesh, &owner, &pool, most_faces));
+        let pairs = independent_pairs(&pool, &borders(mesh, &owner, &pool, which));
         if pairs.is_empty() {
             break;
         }
@@ -84,9 +105,10 @@ pub(super) fn merge(
                 for f in &chart.patch.faces {
                     owner[f.index()] = pool.len();
                 }
+                let split = [a, b].iter().any(|&i| pool[i].as_ref().is_some_and(|c| c.split));
                 pool[a] = None;
                 pool[b] = None;
-                pool.push(Some(Candidate { area: chart.patch.area(), chart, failures: 0, refused: Vec::new() }));
+                pool.push(Some(Candidate::new(chart, split)));
             } else {
                 for (one, other) in [(a, b), (b, a)] {
                     if let Some(c) = &mut pool[one] {
@@ -110,9 +132,13 @@ fn union(mesh: &TriMesh, polygon: &[u32], pool: &[Option<Candidate>], a: usize, 
 }
 
 /// Shared border length of each pair of charts that may still be tested, sorted by pair.
-fn borders(mesh: &TriMesh, owner: &[usize], pool: &[Option<Candidate>], most_faces: usize) -> Vec<(usize, usize, f64)> {
+fn borders(mesh: &TriMesh, owner: &[usize], pool: &[Option<Candidate>], which: Which) -> Vec<(usize, usize, f64)> {
     let faces = |i: usize| pool[i].as_ref().map_or(0, |c| c.chart.patch.faces.len());
-    let small = |a: usize, b: usize| faces(a) + faces(b) <= most_faces;
+    let split = |i: usize| pool[i].as_ref().is_some_and(|c| c.split);
+    let wanted = |a: usize, b: usize| match which {
+        Which::All => true,
+        Which::AfterSplits { most_faces } => (split(a) || split(b)) && faces(a) + faces(b) <= most_faces,
+    };
     let open = |i: usize| pool[i].as_ref().is_some_and(|c| c.failures < MOST_FAILURES);
     let shared = |h: HalfedgeId| {
         let t = mesh.twin(h);
@@ -122,7 +148,7 @@ fn borders(mesh: &TriMesh, owner: &[usize], pool: &[Option<Candidate>], most_fac
         let (a, b) = (owner[h.face().index()], owner[t.face().index()]);
         let (a, b) = (a.min(b), a.max(b));
         let refused = || pool[a].as_ref().is_some_and(|c| c.refused.contains(&b));
-        (a != b && b != usize::MAX && small(a, b) && open(a) && open(b) && !refused())
+        (a != b && b != usize::MAX && wanted(a, b) && open(a) && open(b) && !refused())
             .then(|| (a, b, mesh.edge_length(h)))
     };
     let mut sides: Vec<(usize, usize, f64)> = mesh.halfedges().filter_map(shared).collect();
