@@ -10,7 +10,7 @@ WHEELS := addon/wheels
 # What the wheel is made of. Official Blender runs on glibc 2.28, which zig links against on any newer system.
 NATIVE := Cargo.toml Cargo.lock $(shell find native -name '*.rs' -o -name '*.toml' -o -name '*.pyi' 2>/dev/null)
 
-.PHONY: test test-rust test-python test-blender lint format venv wheel zip demo bench clean
+.PHONY: test test-rust test-python test-blender lint format venv wheel zip demo clean
 
 test: test-rust lint test-python test-blender
 
@@ -46,9 +46,6 @@ zip: wheel
 demo: zip
 	.ci/blender_libraries
 	$(PYTHON) .ci/demo $(MESH)
-
-bench:
-	$(CARGO) bench -p ble_unwrap_core
 
 clean:
 	rm -rf target out .cache $(VENV) $(WHEELS)/*.whl $(WHEELS)/.built
