@@ -41,7 +41,8 @@ def add_setting_arguments(parser):
         option = "--" + name.replace("_", "-")
         text = keywords["description"].replace("%", "%%")
         default = keywords["default"]
-        extra = {"dest": "setting_" + name, "default": None, "help": f"{text} (default: {default})"}
+        shown = " ".join(map(str, default)) if isinstance(default, tuple) else str(default).lower()
+        extra = {"dest": "setting_" + name, "default": None, "help": f"{text} (default: {shown})"}
         if isinstance(default, bool):
             group.add_argument(option, action=argparse.BooleanOptionalAction, **extra)
         elif "items" in keywords:
@@ -82,6 +83,10 @@ def settings_of(arguments, parser):
                 parser.error(f"--texture-size: one or two numbers of pixels between {low} and {high}")
             value = (value[0], value[-1])
         result[name] = value
+    if 0 < result.get("landmark_max", 0) < 3:
+        parser.error("--landmark-max: 0 for no bound, or at least 3")
+    if not 0 <= getattr(arguments, "threads", 0) <= 1024:
+        parser.error("--threads: between 0 and 1024")
     return result
 
 
@@ -218,6 +223,7 @@ def describe(objects, outcome):
         "measured": outcome.certificate.measured,
         "seconds": outcome.report.get("seconds"),
         "rungs": outcome.report.get("rungs"),
+        "charts_over_limit": outcome.report.get("charts_over_limit"),
         "warnings": outcome.certificate.warnings,
     }
 

@@ -13,8 +13,6 @@ SEARCHED_TEXELS = 8
 # Settings whose 0 in the panel is the native module's None.
 ZERO_IS_AUTOMATIC = ("landmark_max", "kernel_width")
 
-NATIVE_NAME = "ble_unwrap_native"
-
 
 class EngineMissing(Exception):
     """The native library cannot be loaded; the text says what to do."""
@@ -57,7 +55,8 @@ def native():
     except ImportError as error:
         raise EngineMissing(
             f"The native library of BLE Unwrap cannot be loaded ({error}). Install the add-on from its zip file, which "
-            f"holds the library for your system, or `pip install {NATIVE_NAME}` for Blender as a Python module"
+            "holds the library for your system; for Blender as a Python module, `pip install` the wheel that "
+            "`make wheel` writes"
         ) from error
     return ble_unwrap_native
 

@@ -182,7 +182,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         description="How distances along the surface are measured",
         items=(
             ("FAST_MARCHING", "Fast Marching", "Wave fronts across triangles: accurate"),
-            ("DIJKSTRA", "Dijkstra", "Shortest paths along edges and unfolded diagonals: 2% less accurate, faster"),
+            ("DIJKSTRA", "Dijkstra", "Shortest paths along edges: some 6% too long, faster"),
         ),
         default="FAST_MARCHING",
     )
@@ -258,7 +258,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         name="Tolerance",
         description="Relative change of the likelihood at which the sweeps stop",
         default=1e-5,
-        min=0.0,
+        min=1e-7,
         max=0.1,
         step=1,
         precision=7,

@@ -7,9 +7,9 @@ use crate::metrics::Measures;
 pub struct Report {
     /// Number of charts.
     pub charts: usize,
-    /// Number of triangles.
+    /// Number of input faces, polygons counted once.
     pub faces: usize,
-    /// Triangles without UVs.
+    /// Input faces without UVs.
     pub unmapped_faces: usize,
     /// L2 stretch of the whole layout at its best scale; 1 is none.
     pub l2: f64,

@@ -77,8 +77,8 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The paper as printed: its model from a random start, all vertices of a patch embedded,
-    /// Sander's line searches, disks, two texels at 1024 (paper, sections 4 to 6).
+    /// The paper as printed: its model from a random start, one vertex in a hundred a landmark (section 5.1; the
+    /// others are placed by regression), Sander's line searches, disks, two texels at 1024.
     #[must_use]
     pub fn paper() -> Self {
         Self {

@@ -44,7 +44,8 @@ enum Step {
 
 /// Cuts and flattens patches until every chart is under the limit. Rounds over all open pieces, in
 /// parallel; a piece is split into two or more of fewer polygons, so there are at most as many rounds
-/// as polygons, and in practice some ten. `done` is told the faces of each chart as it is accepted. Charts come sorted by lowest face.
+/// as polygons, and in practice some ten. `done` is told the faces of each chart as it is accepted.
+/// Charts come sorted by lowest face.
 pub(super) fn chart(
     patches: Vec<Patch>,
     settings: &Settings,

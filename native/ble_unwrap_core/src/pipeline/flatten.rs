@@ -28,7 +28,7 @@ const NEGLIGIBLE: f64 = 1e-8;
 /// development models 275 were above; 7 of these ended under the limit, after most of the time spent on all.
 const MOST_FOLDED: f64 = 0.25;
 /// A start without flips that is stretched more than this is not worth minimising: of the trials on a model
-/// with many holes, where starts are worst, none that began above 3 came under an L2 of 1.1.
+/// with many holes, where starts are worst, none that began above 3 came under an L2 of 1.1; this leaves room.
 const HOPELESS_START: f64 = 4.0;
 
 /// A patch flattened without flips and without overlap.

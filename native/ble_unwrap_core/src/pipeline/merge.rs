@@ -46,9 +46,9 @@ impl Candidate {
 }
 
 /// Joins neighbouring charts, longest shared border over √(smaller area) first, as long as the union
-/// is under the limit. Each chart takes part in at most four failed
-/// tests, so the number of tests is linear in the number of charts. Two halves of a split in two are not
-/// tried: their union has already been refused.
+/// is under the limit. Each chart takes part in at most [`MOST_FAILURES`] failed tests, so the number of
+/// tests is linear in the number of charts. Two halves of a split in two are not tried: their union has
+/// already been refused.
 pub(super) fn merge(
     mesh: &TriMesh,
     polygon: &[u32],

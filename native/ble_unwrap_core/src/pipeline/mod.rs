@@ -43,8 +43,8 @@ pub struct Atlas {
 /// Guaranteed for every result, and checked exactly on the final single-precision values: each face
 /// whose vertices are finite lies in exactly one chart; no triangle is flipped or without area; no
 /// chart overlaps itself or another; charts keep the margin. Every chart has an L2 stretch within
-/// `settings.stretch_limit` or is listed in the report (a single polygon may not flatten under it). The result is the same,
-/// bit for bit, for any number of threads.
+/// `settings.stretch_limit` or is listed in the report (a single polygon may not flatten under it). The
+/// result is the same, bit for bit, for any number of threads.
 ///
 /// Not guaranteed: the fewest charts or the shortest seams possible.
 ///

@@ -46,7 +46,8 @@ pub struct Coarse {
 /// will do: closed, of any genus, of several components, with degenerate faces; some of these stop
 /// above the target.
 ///
-/// O(n log n), one thread but for [`Coarse::face`]: 3 to 8 µs a fine vertex, growing with the caches missed. Deterministic.
+/// O(n log n), one thread but for [`Coarse::face`]: 3 to 8 µs a fine vertex, growing with the
+/// caches missed. Deterministic.
 ///
 /// # Errors
 /// [`Cancelled`] soon after a cancel: at most a few passes over the arrays run unwatched.
