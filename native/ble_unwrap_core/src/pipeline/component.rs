@@ -28,9 +28,10 @@ const COARSE_ALLOWANCE: f64 = 0.6;
 /// Sides by which a border may move on the fine mesh: about two edges of the coarse one at the usual
 /// ratio of one vertex in twenty.
 const BAND_RINGS: usize = 10;
-/// On the fine mesh only charts that a split there has made are joined again, and only small ones: the others
-/// have been tried on the coarse mesh, and a trial costs what flattening them did.
-const FINE_UNION: usize = 6_000;
+/// On the fine mesh only charts that a split there has made are joined again, and only up to so many faces: the
+/// others have been tried on the coarse mesh, and a trial costs what flattening them did. On a body with fingers
+/// and ears 1,200 instead of 6,000 saves a quarter of the time and costs 5 % more charts.
+const FINE_UNION: usize = 1_200;
 /// Share of the work on a component that the coarse mesh takes.
 const COARSE_WORK: f64 = 0.4;
 
