@@ -16,7 +16,7 @@ use super::rungs::{Rung, Rungs};
 
 /// Patches less planar than this are split before any flattening. Far below what the embedding alone would
 /// need (a cap of 100° has 0.79): stretch minimisation brings patches of 0.66 under an L2 of 1.1, and on
-/// the development models 0.6 gives a third fewer charts than 0.85.
+/// five development models 0.6 gives 13 charts in all where 0.85 gives 16.
 const LEAST_PLANARITY: f64 = 0.6;
 /// Spectral splits that deep have not helped; halving by breadth-first order always ends.
 const MOST_SPECTRAL_SPLITS: u32 = 24;
