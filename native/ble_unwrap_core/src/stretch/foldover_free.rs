@@ -3,7 +3,7 @@
 //! Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov: Foldover-free maps in 50 lines of code, ACM TOG
 //! 2021. The energy and the schedule of ε are theirs; they minimise with L-BFGS, this with projected Newton
 //! steps, which reuse the system of the stretch energy: a camel's head of 22,704 faces projected on a
-//! plane (about 10,000 flips) was cleared along each of the three axes within 60 steps.
+//! plane (about 10,000 flips) was cleared along each of the three axes when 60 steps were allowed.
 
 use nalgebra::Point2;
 
