@@ -14,8 +14,10 @@ mod unwrap;
 mod words;
 
 /// Automatic UV unwrapping under a stretch bound, by Bernoulli logistic embedding.
-#[pyo3::pymodule]
-mod ble_unwrap_native {
+///
+/// The Python package around it re-exports everything; nobody imports this module by its name.
+#[pyo3::pymodule(name = "_native")]
+mod native {
     use pyo3::prelude::*;
 
     #[pymodule_export]

@@ -1,0 +1,47 @@
+"""Automatic UV unwrapping under a stretch bound, by Bernoulli logistic embedding.
+
+All here is compiled and needs nothing but Python. What builds upon it in Python, with dependencies of its own, is
+imported by its full name.
+"""
+
+from ._native import (
+    Array,
+    Atlas,
+    BleUnwrapError,
+    Cancelled,
+    Embedding,
+    InternalError,
+    InvalidArgumentError,
+    InvalidMeshError,
+    Job,
+    PackedCharts,
+    __version__,
+    default_settings,
+    embed,
+    geodesic_distances,
+    measure,
+    pack,
+    submit_unwrap,
+    unwrap,
+)
+
+__all__ = [
+    "Array",
+    "Atlas",
+    "BleUnwrapError",
+    "Cancelled",
+    "Embedding",
+    "InternalError",
+    "InvalidArgumentError",
+    "InvalidMeshError",
+    "Job",
+    "PackedCharts",
+    "__version__",
+    "default_settings",
+    "embed",
+    "geodesic_distances",
+    "measure",
+    "pack",
+    "submit_unwrap",
+    "unwrap",
+]
