@@ -4,6 +4,8 @@
 //! ([`FastMarching`]), point clouds along their graph of nearest neighbours ([`knn_graph()`],
 //! [`graph_distances`]).
 
+mod bridges;
+mod connectivity;
 mod dijkstra;
 mod fast_marching;
 mod kd_tree;
@@ -14,6 +16,8 @@ mod min_heap;
 mod settings;
 mod weighted_graph;
 
+pub use bridges::shortest_bridges;
+pub use connectivity::{Connectivity, Piece, connectivity, least_neighbours};
 pub use dijkstra::{DijkstraScratch, dijkstra, dijkstra_within, graph_distances, graph_distances_within};
 pub use fast_marching::{FastMarching, MarchScratch};
 pub use knn_graph::knn_graph;
