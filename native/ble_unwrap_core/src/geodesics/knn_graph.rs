@@ -92,11 +92,12 @@ impl Places {
 mod tests {
     use super::*;
     use crate::geodesics::graph_distances;
+    use crate::geodesics::kd_tree::square_between;
     use proptest::prelude::*;
 
     fn brute_force(points: &[f64], dimension: usize, k: usize) -> WeightedGraph {
         let p: Vec<&[f64]> = points.chunks_exact(dimension).collect();
-        let square = |i: usize, j: usize| p[i].iter().zip(p[j]).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+        let square = |i: usize, j: usize| square_between(p[i], p[j]);
         let first: Vec<usize> = (0..p.len()).filter(|&i| (0..i).all(|j| square(i, j) > 0.0)).collect();
         let mut edges = Vec::new();
         for i in 0..p.len() {
