@@ -6,7 +6,7 @@ use ble_unwrap_core::UnwrapError;
 use ble_unwrap_core::embedding::EmbeddingError;
 use ble_unwrap_core::mesh::MeshError;
 use ble_unwrap_core::packing::PackError;
-use ble_unwrap_core::standalone::{DistancesError, LayoutError, RepackError};
+use ble_unwrap_core::standalone::{CloudError, DistancesError, LayoutError, RepackError};
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -168,6 +168,20 @@ impl Raised for DistancesError {
         match self {
             Self::Mesh(error) => error.kind(),
             Self::Source { .. } | Self::TooLarge { .. } => Kind::Argument,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
+impl Raised for CloudError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::WrongLength { .. }
+            | Self::NotFinite { .. }
+            | Self::Source { .. }
+            | Self::NoNeighbours
+            | Self::TooLarge { .. }
+            | Self::Disconnected(_) => Kind::Argument,
             Self::Cancelled(error) => error.kind(),
         }
     }

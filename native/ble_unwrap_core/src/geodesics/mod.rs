@@ -4,6 +4,8 @@
 //! ([`FastMarching`]), point clouds along their graph of nearest neighbours ([`knn_graph()`],
 //! [`graph_distances`]).
 
+mod bridges;
+mod connectivity;
 mod dijkstra;
 mod farthest_nodes;
 mod fast_marching;
@@ -16,6 +18,8 @@ mod nearest_points;
 mod settings;
 mod weighted_graph;
 
+pub use bridges::shortest_bridges;
+pub use connectivity::{Connectivity, Piece, connectivity, least_neighbours};
 pub use dijkstra::{DijkstraScratch, dijkstra, dijkstra_within, graph_distances, graph_distances_within};
 pub use farthest_nodes::farthest_nodes;
 pub use fast_marching::{FastMarching, MarchScratch};
