@@ -41,6 +41,7 @@ pub(crate) enum Preset {
 pub(crate) enum Function {
     Unwrap,
     Embed,
+    Transform,
     GeodesicDistances,
     GraphDistances,
     Measure,
@@ -52,6 +53,7 @@ impl Function {
         match self {
             Self::Unwrap => "unwrap",
             Self::Embed => "embed",
+            Self::Transform => "transform",
             Self::GeodesicDistances => "geodesic_distances",
             Self::GraphDistances => "graph_distances",
             Self::Measure => "measure",
@@ -126,8 +128,14 @@ const EMBED: &[Function] = &[Function::Embed];
 const GEODESICS: &[Function] = &[Function::GeodesicDistances];
 const PACK: &[Function] = &[Function::Pack];
 const TEXTURE: &[Function] = &[Function::Measure, Function::Pack];
-const ALL: &[Function] =
-    &[Function::Embed, Function::GeodesicDistances, Function::GraphDistances, Function::Measure, Function::Pack];
+const ALL: &[Function] = &[
+    Function::Embed,
+    Function::Transform,
+    Function::GeodesicDistances,
+    Function::GraphDistances,
+    Function::Measure,
+    Function::Pack,
+];
 
 #[rustfmt::skip] // a table: one row a setting
 const TABLE: &[Setting] = &[
@@ -300,7 +308,8 @@ pub(crate) fn set_word(name: &str, target: &mut dyn Words, value: &Bound<'_, PyA
     if known { Ok(()) } else { Err(refusal(name, &crate::words::listed(&target.words()), value)) }
 }
 
-fn refusal(name: &str, expected: &str, value: &Bound<'_, PyAny>) -> PyErr {
+/// The error for a value that is not what it has to be.
+pub(crate) fn refusal(name: &str, expected: &str, value: &Bound<'_, PyAny>) -> PyErr {
     let found = value.repr().map_or_else(|_| "an object that cannot be shown".into(), |text| text.to_string());
     InvalidArgumentError::new_err(format!("{name}: expected {expected}; found {found}"))
 }
