@@ -149,9 +149,8 @@ pub(crate) fn graph_distances(
     }
     let (points, n, p) = arrays::real_matrix(points, Argument { name: "points", shape: "(n, p)" })?;
     if p == 0 {
-        return Err(InvalidArgumentError::new_err(
-            "points: expected at least 1 coordinate a point, found shape (n, 0)",
-        ));
+        let text = format!("points: expected at least 1 coordinate a point, found shape ({n}, 0)");
+        return Err(InvalidArgumentError::new_err(text));
     }
     let sources =
         sources.map(|given| arrays::indices(given, Argument { name: "sources", shape: "(k,)" })).transpose()?;

@@ -1,7 +1,5 @@
 //! Geodesic distances between the points of any cloud.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -13,6 +11,10 @@ use crate::progress::{Cancelled, Progress, Stage};
 /// Numbers of neighbours looked at for one that connects a cloud: above it the edges of most clouds leave their surface,
 /// and the search takes longer than the distances.
 const MOST_NEIGHBOURS_TRIED: usize = 64;
+
+/// Sources whose rows are filled together: enough for many threads, and no more memory is touched before the
+/// next look at the cancel flag.
+const SOURCES_AT_ONCE: usize = 256;
 
 /// What becomes of a cloud whose neighbours do not connect it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -145,22 +147,24 @@ pub fn cloud_distances(
     let scale = power_of_two_within(points);
     let scaled: Vec<f64> = points.iter().map(|x| x / scale).collect();
     let graph = connected_graph(&scaled, dimension, settings, progress)?;
-    rows.resize(count, f64::INFINITY);
-    if rows.is_empty() {
+    if count == 0 {
         return Ok(rows);
     }
     progress.enter(Stage::Charts);
-    let done = AtomicUsize::new(0);
-    rows.par_chunks_mut(n).zip(&sources).try_for_each_init(DijkstraScratch::default, |scratch, (row, &source)| {
-        progress.check()?;
-        let distances = dijkstra_within(&graph, &[(source, 0.0)], settings.radius / scale, scratch, progress)?;
-        for (to, &distance) in row.iter_mut().zip(distances) {
-            *to = distance * scale;
-        }
-        let share = (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / sources.len() as f64;
-        progress.advance(Stage::Charts, share);
-        Ok::<(), Cancelled>(())
-    })?;
+    for sources in sources.chunks(SOURCES_AT_ONCE) {
+        let first = rows.len();
+        rows.resize(first + sources.len() * n, f64::INFINITY);
+        let tasks = rows[first..].par_chunks_mut(n).zip(sources);
+        tasks.try_for_each_init(DijkstraScratch::default, |scratch, (row, &source)| {
+            progress.check()?;
+            let distances = dijkstra_within(&graph, &[(source, 0.0)], settings.radius / scale, scratch, progress)?;
+            for (to, &distance) in row.iter_mut().zip(distances) {
+                *to = distance * scale;
+            }
+            Ok::<(), Cancelled>(())
+        })?;
+        progress.advance(Stage::Charts, rows.len() as f64 / count as f64);
+    }
     if all {
         make_symmetric(&mut rows, n);
     }
