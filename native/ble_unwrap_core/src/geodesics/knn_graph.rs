@@ -17,9 +17,10 @@ const CHUNK: usize = 256;
 /// `k` of them would be an island: the first of them stands for all, and the others hang from it
 /// by edges of length 0. Points with a coordinate that is not finite get no edge.
 ///
-/// The paper uses 12 neighbours (section 5). Whether they connect the graph, and how to mend it if not,
-/// tells [`connectivity()`](super::connectivity()). O(n log n) in few dimensions; the same graph for any number of
-/// threads.
+/// Whether so many neighbours connect the graph, and how to mend it if not, tells
+/// [`connectivity()`](super::connectivity()). Distances along the graph are those of the paper's section 5.1 for point
+/// clouds; it does not say how many neighbours, 12 serve well. O(n log n) in few dimensions; the same graph for any
+/// number of threads.
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.

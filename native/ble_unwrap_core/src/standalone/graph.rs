@@ -39,7 +39,8 @@ pub struct CloudSettings {
 }
 
 impl Default for CloudSettings {
-    /// The paper's 12 neighbours (section 5), no bound; a cloud in pieces is an error.
+    /// 12 neighbours, whose distances are 3 % too long on average where 6 give 10 %, and which seldom leave a surface
+    /// that 24 leave; no bound; a cloud in pieces is an error.
     fn default() -> Self {
         Self { neighbours: 12, connect: Connect::Error, radius: f64::INFINITY }
     }
@@ -108,8 +109,8 @@ fn others_text(others: usize) -> String {
 ///
 /// `points` holds `dimension` ≥ 1 coordinates a point, row after row. An estimate of the distance on the surface that
 /// the points sample: along zigzags, so too long by some per cent that more points do not take away but more neighbours
-/// do, and too short where edges leave the surface. On random samples 12 neighbours are some 4 % too long; see the
-/// accuracy table of the tests. Points that coincide are at distance 0. With all sources the matrix is exactly
+/// do, and too short where edges leave the surface. On random points of smooth surfaces it is 3 % too long on average with
+/// 12 neighbours, 0.9 % with 24. Points that coincide are at distance 0. With all sources the matrix is exactly
 /// symmetric, and the triangle inequality holds to rounding. Infinite: beyond `radius`; between pieces, if
 /// these are to be separate. The same for any number of threads.
 ///
