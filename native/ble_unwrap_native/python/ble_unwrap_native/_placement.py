@@ -4,7 +4,7 @@ The same logistic regression as the compiled one, from plain arrays: an estimato
 distances itself, has nothing else. Terms: m points are placed in q dimensions by k landmarks.
 """
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -24,16 +24,14 @@ LEAST_AFFINITY = 1e-12
 # Beyond it exp underflows.
 LARGEST_EXPONENT = 700.0
 
-Kernel = Literal["logistic", "gaussian"]
 
-
-def affinities(squared: np.ndarray, sigma: float, kernel: Kernel) -> np.ndarray:
+def affinities(squared: np.ndarray, sigma: float, kernel: str) -> np.ndarray:
     """Affinities of points at these squared distances: 1/(1 + exp(d²/2σ)), or exp(-d²/2σ)."""
     u = np.minimum(squared / (2 * sigma), LARGEST_EXPONENT)
     return 1 / (1 + np.exp(u)) if kernel == "logistic" else np.exp(-u)
 
 
-def log_odds(squared: np.ndarray, sigma: float, kernel: Kernel) -> np.ndarray:
+def log_odds(squared: np.ndarray, sigma: float, kernel: str) -> np.ndarray:
     """log(p/(1 − p)) of the affinities of these squared distances; finite, and exact however small p is."""
     u = squared / (2 * sigma)
     return -u if kernel == "logistic" else -u - np.log(-np.expm1(-np.maximum(u, LEAST_AFFINITY)))

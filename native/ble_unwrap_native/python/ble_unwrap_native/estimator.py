@@ -24,7 +24,7 @@ from sklearn.neighbors import NearestNeighbors  # type: ignore[import-untyped]
 from sklearn.utils import check_random_state, check_scalar  # type: ignore[import-untyped]
 from sklearn.utils.validation import check_is_fitted, validate_data  # type: ignore[import-untyped]
 
-from ._native import InvalidArgumentError, embed, graph_distances
+from . import InvalidArgumentError, embed, graph_distances
 from ._placement import LandmarkRegression, LandmarkScaling, affinities, affinity_log_odds, chunks, log_odds
 
 __all__ = ["BernoulliLogisticEmbedding"]
@@ -41,6 +41,9 @@ MOST_OCTAVES = 60
 MOST_POINTS_WITHOUT_LANDMARKS = 2_000
 # Landmarks of more points than that. On digits, tori and rolls 200 lose nothing against all points.
 DEFAULT_LANDMARKS = 500
+
+# To type checkers of Python 3.11 a NumPy array is no buffer, which `embed` and `graph_distances` take.
+Bytes = Any
 
 CHOICES = {
     "metric": ("euclidean", "geodesic", "precomputed", "precomputed_affinity"),
@@ -414,18 +417,19 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
             row, column = np.argwhere(data > 1)[0]
             raise ValueError(f"affinities must lie in [0, 1]; found {data[row, column]} in row {row}, column {column}")
 
-    def _along_graph(self, data: np.ndarray) -> np.ndarray:
+    def _along_graph(self, data: Bytes) -> np.ndarray:
+        sources: Bytes = self.landmark_indices_
         options: dict[str, Any] = {
             "neighbours": min(int(self.n_neighbors), len(data) - 1),
             "threads": effective_n_jobs(self.n_jobs),
         }
         try:
-            distances = graph_distances(data, self.landmark_indices_, connect="error", **options)
+            distances = graph_distances(data, sources, connect="error", **options)
         except InvalidArgumentError as error:
             if self.connect == "error":
                 raise ValueError(f"{error} (n_neighbors={self.n_neighbors}, connect='error')") from error
             try:
-                distances = graph_distances(data, self.landmark_indices_, connect="bridge", **options)
+                distances = graph_distances(data, sources, connect="bridge", **options)
             except InvalidArgumentError as other:
                 raise ValueError(str(other)) from other
             warnings.warn(f"Pieces of the graph were joined by their shortest edges. {error}", stacklevel=4)
@@ -442,7 +446,7 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
 
     # Fit and placement --------------------------------------------------------------------------------------------
 
-    def _fit_landmarks(self, own: np.ndarray, start: np.ndarray | None, seed: int) -> np.ndarray:
+    def _fit_landmarks(self, own: Bytes, start: np.ndarray | None, seed: int) -> np.ndarray:
         """Fits the landmarks by their distances, or affinities, among themselves; their places, in units of √σ."""
         options: dict[str, Any] = {"dimensions": int(self.n_components), "threads": effective_n_jobs(self.n_jobs)}
         options["model"] = self.model
@@ -474,6 +478,7 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
         except InvalidArgumentError as error:
             raise ValueError(str(error)) from error
 
+        self._placement: LandmarkRegression | LandmarkScaling
         report, places = fit.report, np.asarray(fit.coordinates).copy()
         self.intercepts_ = np.asarray(fit.intercepts).copy()
         if self.model == "isomap":
@@ -509,7 +514,7 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
             )
         return mean_squared * 2.0 ** brentq(excess, -MOST_OCTAVES, MOST_OCTAVES)
 
-    def _kernel(self) -> Literal["logistic", "gaussian"]:
+    def _kernel(self) -> str:
         return "gaussian" if self.model == "paper" else "logistic"
 
     def _unit(self) -> float:
