@@ -103,7 +103,7 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
     relaxation : float, default=1.6
         Relaxation ω of a step, inside (0, 2).
 
-    max_sweeps : int, default=500
+    max_sweeps : int, default=1000
         Most passes over all landmarks. A fit that uses them up warns.
 
     tolerance : float, default=1e-5
@@ -214,7 +214,7 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
         kernel_width: float | None = None,
         mean_affinity: float | None = None,
         relaxation: float = 1.6,
-        max_sweeps: int = 500,
+        max_sweeps: int = 1000,
         tolerance: float = 1e-5,
         update: Literal["serial", "parallel"] = "serial",
         initial: Any = "mds",
