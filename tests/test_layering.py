@@ -250,8 +250,8 @@ def test_python_layers(file):
 
 
 PACKAGE = ROOT / "native/ble_unwrap_native/python/ble_unwrap_native"
-# Module of the Python package around the native one -> what it may import besides the standard library. Blender's Python
-# has no scikit-learn, and the package shall load where there is no NumPy either.
+# Module of the Python package around the native one -> what it may import besides the standard library. Blender's
+# Python has no scikit-learn, and the package shall load where there is no NumPy either.
 PACKAGE_MAY_IMPORT = {
     "__init__.py": {"._native"},
     "estimator.py": {".", "._placement", "joblib", "numpy", "scipy", "sklearn"},

@@ -324,8 +324,7 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
         X = validate_data(self, X, dtype=(np.float64, np.float32), reset=False)
         data = np.ascontiguousarray(X, dtype=np.float64)
         if self.metric.startswith("precomputed"):
-            self._check_range(data)
-            known = data[:, self.landmark_indices_]
+            known = self._in_range(data)[:, self.landmark_indices_]
         elif self.metric == "geodesic":
             known = self._through_neighbours(data)
         else:
@@ -400,12 +399,13 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
             return self._to_landmarks
         if data.shape[0] != data.shape[1]:
             raise ValueError(f"metric={self.metric!r} needs a square matrix of all pairs; found shape {data.shape}")
-        self._check_range(data)
+        data = self._in_range(data)
         known = 0.5 * (data[:, chosen] + data[chosen].T)
         known[chosen, np.arange(len(chosen))] = 0
         return known
 
-    def _check_range(self, data: np.ndarray) -> None:
+    def _in_range(self, data: np.ndarray) -> np.ndarray:
+        """Distances or affinities, if they can be such."""
         bad = data < 0
         if bad.any():
             row, column = np.argwhere(bad)[0]
@@ -416,6 +416,7 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
         if self.metric == "precomputed_affinity" and (data > 1).any():
             row, column = np.argwhere(data > 1)[0]
             raise ValueError(f"affinities must lie in [0, 1]; found {data[row, column]} in row {row}, column {column}")
+        return data
 
     def _along_graph(self, data: Bytes) -> np.ndarray:
         sources: Bytes = self.landmark_indices_
