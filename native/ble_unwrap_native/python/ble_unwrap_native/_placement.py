@@ -4,16 +4,14 @@ The same logistic regression as the compiled one, from plain arrays: an estimato
 distances itself, has nothing else. Terms: m points are placed in q dimensions by k landmarks.
 """
 
-from typing import Any
-
 import numpy as np
 
-# Pairs of a point and a landmark at work at once: 8 MB an array, of which there are about ten.
-PAIRS_AT_ONCE = 1 << 20
+# Pairs of a point and a landmark at work at once: half a megabyte an array, so that all stay in a core's cache.
+PAIRS_AT_ONCE = 1 << 16
 # Newton steps of a point; four or five are usual, and each halving counts. One that uses them up keeps its best place.
 MOST_STEPS = 50
 # A Newton step shorter than this, in units of √σ, is the last: the next would be of its square.
-LAST_STEP = 1e-7
+LAST_STEP = 1e-6
 # Share of its trace that is added to the diagonal of a curvature, for landmarks on a line. As in the fit.
 RIDGE = 1e-9
 # Weight of a point's place by least squares against its likelihood. A pair of affinity ½ weighs ¼: this decides only
@@ -152,7 +150,8 @@ class LandmarkScaling:
         return (self.mean_squared - squared) @ self.projection
 
 
-def chunks(count: int, landmarks: int) -> Any:
-    """Slices of the points, so many that no array of pairs grows large."""
-    size = max(1, PAIRS_AT_ONCE // max(landmarks, 1))
-    return (slice(begin, begin + size) for begin in range(0, count, size))
+def chunks(known: np.ndarray) -> list[np.ndarray]:
+    """The rows of a matrix of points and landmarks, in parts of no more than `PAIRS_AT_ONCE` pairs."""
+    count, landmarks = known.shape
+    size = max(1, PAIRS_AT_ONCE // landmarks)
+    return [known[begin : begin + size] for begin in range(0, count, size)]

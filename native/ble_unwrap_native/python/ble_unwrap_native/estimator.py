@@ -11,7 +11,7 @@ from numbers import Integral, Real
 from typing import Any, Literal
 
 import numpy as np
-from joblib import effective_n_jobs  # type: ignore[import-untyped]
+from joblib import Parallel, delayed, effective_n_jobs  # type: ignore[import-untyped]
 from scipy.optimize import brentq  # type: ignore[import-untyped]
 from scipy.spatial.distance import cdist  # type: ignore[import-untyped]
 from sklearn.base import (  # type: ignore[import-untyped]
@@ -536,10 +536,9 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
 
     def _place(self, known: np.ndarray) -> np.ndarray:
         """Places points by their distances, or affinities, to the landmarks, in units of √σ."""
-        placed = np.empty((len(known), self._landmarks.shape[1]))
-        for part in chunks(*known.shape):
-            placed[part] = self._place_part(known[part])
-        return placed
+        # NumPy lets other threads work while it does.
+        work = Parallel(n_jobs=self.n_jobs, prefer="threads")
+        return np.concatenate(work(delayed(self._place_part)(part) for part in chunks(known)))
 
     def _place_part(self, known: np.ndarray) -> np.ndarray:
         if isinstance(self._placement, LandmarkScaling):
