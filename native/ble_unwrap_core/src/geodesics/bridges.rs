@@ -110,6 +110,7 @@ fn nearest_pairs(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geodesics::kd_tree::square_between;
     use crate::geodesics::{graph_distances, knn_graph};
     use proptest::prelude::*;
 
@@ -128,7 +129,7 @@ mod tests {
         let mut pairs = Vec::new();
         for i in 0..p.len() {
             for j in i + 1..p.len() {
-                pairs.push((p[i].iter().zip(p[j]).fold(0.0, |s, (a, b)| s + (a - b) * (a - b)), i, j));
+                pairs.push((square_between(p[i], p[j]), i, j));
             }
         }
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));

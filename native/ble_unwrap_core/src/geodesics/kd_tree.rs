@@ -1,7 +1,11 @@
 //! Exact nearest neighbours of points in any number of dimensions.
 
-/// Points in a leaf: few enough that scanning them costs no more than the branches it saves.
+/// Points in a leaf: few enough that scanning them costs no more than the branches it saves. At least as many as
+/// dimensions, since a box costs as much as two points and excludes little where there are many.
 const LEAF: usize = 12;
+
+/// Sums that run side by side.
+const LANES: usize = 4;
 
 /// Stands for several labels below one node of the tree.
 const MIXED: u32 = u32::MAX;
@@ -68,7 +72,7 @@ impl<'p> KdTree<'p> {
             }
             self.nodes.push(Node { begin: begin as u32, end: end as u32, second: 0 });
             let (axis, width) = self.push_box(begin, end);
-            if end - begin <= LEAF || width <= 0.0 {
+            if end - begin <= LEAF.max(self.dimension) || width <= 0.0 {
                 continue; // few, or all in one place
             }
             let middle = begin + (end - begin) / 2;
@@ -110,16 +114,11 @@ impl<'p> KdTree<'p> {
     fn square_to(&self, node: u32, q: &[f64]) -> f64 {
         let bounds = &self.boxes[node as usize * 2 * self.dimension..][..2 * self.dimension];
         let (low, high) = bounds.split_at(self.dimension);
-        q.iter().zip(low).zip(high).fold(0.0, |sum, ((&x, &low), &high)| {
-            let outside = if x < low {
-                low - x
-            } else if x > high {
-                x - high
-            } else {
-                0.0
-            };
-            sum + outside * outside
-        })
+        let mut sums = Sums::default();
+        for ((q, low), high) in q.chunks(LANES).zip(low.chunks(LANES)).zip(high.chunks(LANES)) {
+            sums.add_squares(q.len(), |i| (low[i] - q[i]).max(q[i] - high[i]).max(0.0));
+        }
+        sums.total()
     }
 
     /// Hands leaves to `visit`, the nearer first more or less. Left out is what lies beyond a squared
@@ -214,6 +213,33 @@ impl<'p> KdTree<'p> {
 }
 
 #[inline]
-fn square_between(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + (a - b) * (a - b))
+pub(super) fn square_between(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = Sums::default();
+    let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let (rest_a, rest_b) = (a.remainder(), b.remainder());
+    for (a, b) in a.zip(b) {
+        sums.add_squares(LANES, |i| a[i] - b[i]);
+    }
+    sums.add_squares(rest_a.len().min(rest_b.len()), |i| rest_a[i] - rest_b[i]);
+    sums.total()
+}
+
+/// A sum of squares in one order wherever it is taken.
+#[derive(Default)]
+struct Sums([f64; LANES]);
+
+impl Sums {
+    /// Adds at most [`LANES`] squares.
+    #[inline]
+    fn add_squares(&mut self, count: usize, term: impl Fn(usize) -> f64) {
+        for (i, sum) in self.0[..count].iter_mut().enumerate() {
+            let x = term(i);
+            *sum += x * x;
+        }
+    }
+
+    #[inline]
+    fn total(&self) -> f64 {
+        (self.0[0] + self.0[1]) + (self.0[2] + self.0[3])
+    }
 }

@@ -17,9 +17,10 @@ const CHUNK: usize = 256;
 /// `k` of them would be an island: the first of them stands for all, and the others hang from it
 /// by edges of length 0. Points with a coordinate that is not finite get no edge.
 ///
-/// The paper uses 12 neighbours (section 5). Whether they connect the graph, and how to mend it if not,
-/// tells [`connectivity()`](super::connectivity()). O(n log n) in few dimensions; the same graph for any number of
-/// threads.
+/// Whether so many neighbours connect the graph, and how to mend it if not, tells
+/// [`connectivity()`](super::connectivity()). Distances along the graph are those of the paper's section 5.1 for point
+/// clouds; it does not say how many neighbours, 12 serve well. O(n log n) in few dimensions; the same graph for any
+/// number of threads.
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
@@ -92,11 +93,12 @@ impl Places {
 mod tests {
     use super::*;
     use crate::geodesics::graph_distances;
+    use crate::geodesics::kd_tree::square_between;
     use proptest::prelude::*;
 
     fn brute_force(points: &[f64], dimension: usize, k: usize) -> WeightedGraph {
         let p: Vec<&[f64]> = points.chunks_exact(dimension).collect();
-        let square = |i: usize, j: usize| p[i].iter().zip(p[j]).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+        let square = |i: usize, j: usize| square_between(p[i], p[j]);
         let first: Vec<usize> = (0..p.len()).filter(|&i| (0..i).all(|j| square(i, j) > 0.0)).collect();
         let mut edges = Vec::new();
         for i in 0..p.len() {

@@ -1,7 +1,5 @@
 //! Geodesic distances between the points of any cloud.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -13,6 +11,10 @@ use crate::progress::{Cancelled, Progress, Stage};
 /// Numbers of neighbours looked at for one that connects a cloud: above it the edges of most clouds leave their surface,
 /// and the search takes longer than the distances.
 const MOST_NEIGHBOURS_TRIED: usize = 64;
+
+/// Sources whose rows are filled together: enough for many threads, and no more memory is touched before the
+/// next look at the cancel flag.
+const SOURCES_AT_ONCE: usize = 256;
 
 /// What becomes of a cloud whose neighbours do not connect it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,7 +39,8 @@ pub struct CloudSettings {
 }
 
 impl Default for CloudSettings {
-    /// The paper's 12 neighbours (section 5), no bound; a cloud in pieces is an error.
+    /// 12 neighbours, whose distances are 3 % too long on average where 6 give 10 %, and which seldom leave a surface
+    /// that 24 leave; no bound; a cloud in pieces is an error.
     fn default() -> Self {
         Self { neighbours: 12, connect: Connect::Error, radius: f64::INFINITY }
     }
@@ -106,8 +109,8 @@ fn others_text(others: usize) -> String {
 ///
 /// `points` holds `dimension` ≥ 1 coordinates a point, row after row. An estimate of the distance on the surface that
 /// the points sample: along zigzags, so too long by some per cent that more points do not take away but more neighbours
-/// do, and too short where edges leave the surface. On random samples 12 neighbours are some 4 % too long; see the
-/// accuracy table of the tests. Points that coincide are at distance 0. With all sources the matrix is exactly
+/// do, and too short where edges leave the surface. On random points of smooth surfaces it is 3 % too long on average with
+/// 12 neighbours, 0.9 % with 24. Points that coincide are at distance 0. With all sources the matrix is exactly
 /// symmetric, and the triangle inequality holds to rounding. Infinite: beyond `radius`; between pieces, if
 /// these are to be separate. The same for any number of threads.
 ///
@@ -145,22 +148,24 @@ pub fn cloud_distances(
     let scale = power_of_two_within(points);
     let scaled: Vec<f64> = points.iter().map(|x| x / scale).collect();
     let graph = connected_graph(&scaled, dimension, settings, progress)?;
-    rows.resize(count, f64::INFINITY);
-    if rows.is_empty() {
+    if count == 0 {
         return Ok(rows);
     }
     progress.enter(Stage::Charts);
-    let done = AtomicUsize::new(0);
-    rows.par_chunks_mut(n).zip(&sources).try_for_each_init(DijkstraScratch::default, |scratch, (row, &source)| {
-        progress.check()?;
-        let distances = dijkstra_within(&graph, &[(source, 0.0)], settings.radius / scale, scratch, progress)?;
-        for (to, &distance) in row.iter_mut().zip(distances) {
-            *to = distance * scale;
-        }
-        let share = (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / sources.len() as f64;
-        progress.advance(Stage::Charts, share);
-        Ok::<(), Cancelled>(())
-    })?;
+    for sources in sources.chunks(SOURCES_AT_ONCE) {
+        let first = rows.len();
+        rows.resize(first + sources.len() * n, f64::INFINITY);
+        let tasks = rows[first..].par_chunks_mut(n).zip(sources);
+        tasks.try_for_each_init(DijkstraScratch::default, |scratch, (row, &source)| {
+            progress.check()?;
+            let distances = dijkstra_within(&graph, &[(source, 0.0)], settings.radius / scale, scratch, progress)?;
+            for (to, &distance) in row.iter_mut().zip(distances) {
+                *to = distance * scale;
+            }
+            Ok::<(), Cancelled>(())
+        })?;
+        progress.advance(Stage::Charts, rows.len() as f64 / count as f64);
+    }
     if all {
         make_symmetric(&mut rows, n);
     }
