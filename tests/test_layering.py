@@ -249,6 +249,28 @@ def test_python_layers(file):
         assert not foreign, "an extension has only Blender's Python; its own modules are imported relatively"
 
 
+PACKAGE = ROOT / "native/ble_unwrap_native/python/ble_unwrap_native"
+# Module of the Python package around the native one -> what it may import besides the standard library. Blender's
+# Python has no scikit-learn, and the package shall load where there is no NumPy either.
+PACKAGE_MAY_IMPORT = {
+    "__init__.py": {"._native"},
+    "estimator.py": {".", "._placement", "joblib", "numpy", "scipy", "sklearn"},
+    "_placement.py": {"numpy"},
+}
+
+
+@pytest.mark.parametrize("file", sorted(PACKAGE.glob("*.py")), ids=lambda f: f.name)
+def test_package_layers(file):
+    assert file.name in PACKAGE_MAY_IMPORT, "the module is not in the table of layers"
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), str(file))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found.add("." * node.level + (node.module or "") if node.level else node.module.split(".")[0])
+    assert found - set(sys.stdlib_module_names) <= PACKAGE_MAY_IMPORT[file.name]
+
+
 # The test itself ----------------------------------------------------------------------------------------------------
 
 
