@@ -1,6 +1,7 @@
 //! Python bindings of BLE Unwrap: converts, calls the core, converts back. Registration alone is here.
 
 mod arrays;
+mod cloud;
 mod distances;
 mod embed;
 mod errors;
@@ -22,6 +23,9 @@ mod native {
 
     #[pymodule_export]
     use crate::distances::{geodesic_distances, graph_distances};
+    use crate::cloud::{PointAtlas, submit_unwrap_points, unwrap_points};
+    #[pymodule_export]
+    use crate::distances::geodesic_distances;
     #[pymodule_export]
     use crate::embed::{Embedding, embed};
     #[pymodule_export]

@@ -15,6 +15,7 @@ from ._native import (
     InvalidMeshError,
     Job,
     PackedCharts,
+    PointAtlas,
     __version__,
     default_settings,
     embed,
@@ -23,7 +24,9 @@ from ._native import (
     measure,
     pack,
     submit_unwrap,
+    submit_unwrap_points,
     unwrap,
+    unwrap_points,
 )
 
 __all__ = [
@@ -37,6 +40,7 @@ __all__ = [
     "InvalidMeshError",
     "Job",
     "PackedCharts",
+    "PointAtlas",
     "__version__",
     "default_settings",
     "embed",
@@ -45,5 +49,7 @@ __all__ = [
     "measure",
     "pack",
     "submit_unwrap",
+    "submit_unwrap_points",
     "unwrap",
+    "unwrap_points",
 ]
