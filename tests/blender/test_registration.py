@@ -19,6 +19,7 @@ def entries(menu, addon):
 def test_menus_have_one_entry_each(addon):
     assert entries("IMAGE_MT_uvs_unwrap", addon) == 1
     assert entries("VIEW3D_MT_object", addon) == 1
+    assert entries("VIEW3D_MT_edit_pointcloud", addon) == 1
     # From 4.3 on this menu shows the one above: an entry of its own would be there twice.
     assert entries("VIEW3D_MT_uv_map", addon) == int(bpy.app.version < (4, 3, 0))
 
@@ -45,7 +46,9 @@ def test_presets_are_those_of_the_native_module(addon, preset):
     settings = bpy.context.scene.ble_unwrap
     settings.preset = preset
     shown = {
-        name: getattr(settings, name) for name in properties.annotations() if name not in properties.BRIDGE_SETTINGS
+        name: getattr(settings, name)
+        for name in properties.annotations()
+        if name not in (*properties.BRIDGE_SETTINGS, *properties.CLOUD_SETTINGS)
     }
     shown["texture_size"] = tuple(shown["texture_size"])
     ours = engine.native_settings(shown)
