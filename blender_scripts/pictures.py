@@ -113,12 +113,12 @@ def layout(selection, uv, size=900):
 
 
 def point_layout(uv, colours, size=900):
-    """The UVs of points as (size, size, 3): a dot each in its colour, (n, 3) in 0..1, as large as keeps them apart."""
+    """The UVs of points as (size, size, 3): a dot each in its colour, (n, 3) in 0..1."""
     canvas = np.empty((size, size, 3), np.uint8)
     canvas[:] = EMPTY
     inside = np.isfinite(uv).all(axis=1)
     uv, colours = uv[inside].astype(np.float64), (np.clip(colours[inside], 0, 1) * 255 + 0.5).astype(np.uint8)
-    radius = max(0.5, 0.35 * size / np.sqrt(max(len(uv), 1)))
+    radius = max(0.5, 0.6 * size / np.sqrt(max(len(uv), 1)))
     reach = int(np.ceil(radius))
     column, row = np.floor(uv[:, 0] * size).astype(np.int64), np.floor((1 - uv[:, 1]) * size).astype(np.int64)
     for down in range(-reach, reach + 1):
