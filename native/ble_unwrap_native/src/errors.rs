@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use ble_unwrap_core::UnwrapError;
+use ble_unwrap_core::{CloudError, UnwrapError};
 use ble_unwrap_core::embedding::EmbeddingError;
 use ble_unwrap_core::mesh::MeshError;
 use ble_unwrap_core::packing::PackError;
@@ -138,6 +138,20 @@ impl Raised for UnwrapError {
             Self::Setting { .. } => Kind::Argument,
             Self::Pack(error) => error.kind(),
             Self::Check(_) => Kind::Mesh,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
+impl Raised for CloudError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Setting(error) => error.kind(),
+            Self::Pack(error) => error.kind(),
+            Self::Neighbours { .. }
+            | Self::NoFinitePoint { .. }
+            | Self::TooLarge { .. }
+            | Self::TooManySpecks { .. } => Kind::Argument,
             Self::Cancelled(error) => error.kind(),
         }
     }

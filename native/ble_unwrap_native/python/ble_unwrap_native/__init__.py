@@ -15,6 +15,7 @@ from ._native import (
     InvalidMeshError,
     Job,
     PackedCharts,
+    PointAtlas,
     __version__,
     default_settings,
     embed,
@@ -22,7 +23,9 @@ from ._native import (
     measure,
     pack,
     submit_unwrap,
+    submit_unwrap_points,
     unwrap,
+    unwrap_points,
 )
 
 __all__ = [
@@ -36,6 +39,7 @@ __all__ = [
     "InvalidMeshError",
     "Job",
     "PackedCharts",
+    "PointAtlas",
     "__version__",
     "default_settings",
     "embed",
@@ -43,5 +47,7 @@ __all__ = [
     "measure",
     "pack",
     "submit_unwrap",
+    "submit_unwrap_points",
     "unwrap",
+    "unwrap_points",
 ]
