@@ -67,11 +67,11 @@ class CloudTask:
         held, attribute = cloud_bridge.write_uvs(
             self.cloud, uv, make_new=self.make_new, map_name=self.settings["uv_map_name"]
         )
-        warnings = [*self.cloud.warnings, *result.report.get("warnings", ())]
+        warnings = [*self.cloud.warnings, *(f"{self.title}: {text}" for text in result.report.get("warnings", ()))]
         if attribute != (self.settings["uv_map_name"] or cloud_bridge.DEFAULT_NAME) and not self.make_new:
             warnings.append(f"{self.title}: its UVs are in {attribute}, since the name was taken by other data")
         limit = self.settings["stretch_limit"]
-        found = cloud_report.measured(result, uv, held, self.cloud.positions)
+        found = cloud_report.measured(result, uv, held)
         certificate = cloud_report.certify(found, stretch_limit=limit, warnings=warnings)
         seconds = time.perf_counter() - self.started
         return Outcome(

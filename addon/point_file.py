@@ -4,6 +4,7 @@ A map of points is kept as the vertex properties `s` and `t`, as other tools do 
 """
 
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -78,7 +79,9 @@ def _vertices(path):
         count = int(lines[first][2])
         stream.seek(end.end())
         if kind == "ascii":
-            text = np.loadtxt(stream, max_rows=count, ndmin=2, comments=None) if count else np.empty((0, len(fields)))
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # of missing lines, which the assignment below refuses
+                text = np.loadtxt(stream, max_rows=count, ndmin=2, comments=None)
             rows = np.empty(count, fields)
             for number, (name, _) in enumerate(fields):
                 rows[name] = text[:, number]

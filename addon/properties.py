@@ -142,7 +142,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         default=False,
     )
     coarse: BoolProperty(
-        name="Coarse Mesh",
+        name="Coarse First",
         description="Decide on a coarse copy where to cut large pieces of surface, which is many times faster",
         default=True,
     )
@@ -180,8 +180,9 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         name="Neighbours",
         description="Nearest points that each point of a cloud is joined to; more bridge gaps, fewer keep sheets apart",
         default=12,
-        min=3,
-        max=64,
+        min=4,
+        max=256,
+        soft_max=64,
     )
 
     # ---- landmarks and distances
@@ -313,7 +314,10 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
 # Settings that the native module never sees.
 BRIDGE_SETTINGS = ("use_seams", "use_selection", "uv_map", "uv_map_name", "use_original_bounds", "mark_seams")
 # What means something for surfaces only, or for clouds only; the other one's functions do not take it.
-SURFACE_SETTINGS = ("use_seams", "mark_seams", "weld", "coarse", "holes", "geodesics")
+SURFACE_SETTINGS = (
+    *("use_seams", "mark_seams", "weld", "merge", "holes", "chart_scale", "geodesics"),
+    *("stretch_solver", "stretch_iterations"),
+)
 CLOUD_SETTINGS = ("neighbours",)
 
 # What the panel shows at once, and what it folds away, by title.

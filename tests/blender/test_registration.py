@@ -6,6 +6,7 @@ from pathlib import Path
 
 import addon_loader
 import bpy
+import numpy as np
 import pytest
 
 
@@ -60,6 +61,34 @@ def test_presets_are_those_of_the_native_module(addon, preset):
     for name, value in theirs.items():
         expected = pytest.approx(value, rel=1e-6) if isinstance(value, float) else value
         assert ours[name] == expected, name
+
+
+def test_settings_of_surfaces_are_those_that_clouds_do_not_take(addon):
+    """The table in properties.py against the native module, setting by setting."""
+    properties, engine = addon("properties"), addon("engine")
+    points = np.random.default_rng(0).random((8, 3)).astype(np.float32)
+    defaults = properties.default_values()
+    for name in properties.annotations():
+        if name in properties.BRIDGE_SETTINGS:
+            continue
+        try:
+            engine.unwrap_points(points, {name: defaults[name]})
+            taken = True
+        except engine.EngineError:
+            taken = False
+        assert taken is (name not in properties.SURFACE_SETTINGS), name
+
+
+def test_neighbours_default_and_range_are_the_native_modules(addon):
+    engine, keywords = addon("engine"), addon("properties").annotations()["neighbours"].keywords
+    points = np.random.default_rng(0).random((40, 3)).astype(np.float32)
+    default = engine.unwrap_points(points, {}).uv
+    assert np.array_equal(engine.unwrap_points(points, {"neighbours": keywords["default"]}).uv, default)
+    for value in (keywords["min"], keywords["max"]):
+        engine.unwrap_points(points, {"neighbours": value})
+    for value in (keywords["min"] - 1, keywords["max"] + 1):
+        with pytest.raises(engine.EngineError, match="neighbours"):
+            engine.unwrap_points(points, {"neighbours": value})
 
 
 def test_choosing_a_preset_keeps_where_the_result_goes():
