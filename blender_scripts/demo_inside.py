@@ -23,8 +23,9 @@ import tables
 
 RENDER_SIZE = (640, 480)
 RENDER_SAMPLES = 12
-CLOUD_SIZE = (600, 400)
+CLOUD_SIZE = (560, 312)
 CLOUD_CELLS = 16
+CLOUD_SAMPLES = 32
 
 
 def show_progress(fraction, stage):
@@ -83,7 +84,7 @@ def demonstrate_cloud(cloud, name, out, options):
         print(f"{name}: rendering", flush=True)
         (map_name,) = outcome.maps
         part = out / f".{name}.png"
-        render.render_objects([cloud], part, map_name, size=CLOUD_SIZE, samples=RENDER_SAMPLES, cells=CLOUD_CELLS)
+        render.render_objects([cloud], part, map_name, size=CLOUD_SIZE, samples=CLOUD_SAMPLES, cells=CLOUD_CELLS)
         uv = render_points.map_of(cloud, map_name)
         atlas = pictures.point_layout(uv, render_points.checker_colours(uv, CLOUD_CELLS), CLOUD_SIZE[1])
         found = outcome.certificate.measured
