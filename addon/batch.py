@@ -101,8 +101,11 @@ def settings_of(arguments, parser):
 def make_parser():
     parser = argparse.ArgumentParser(
         prog="ble_unwrap",
-        description="Unwrap mesh files: " + ", ".join("." + name for name in asset_io.INPUT_FORMATS) + ".",
-        epilog="Exit codes: 0 all fine, 1 some assets failed, 2 usage, 3 environment, 4 a certificate does not hold.",
+        description="Unwrap files of meshes, or of points without faces: "
+        + ", ".join("." + name for name in asset_io.INPUT_FORMATS)
+        + ".",
+        epilog="Meshes get a UV map, points an attribute of two floats; of the files .blend and .ply keep the latter. "
+        "Exit codes: 0 all fine, 1 some assets failed, 2 usage, 3 environment, 4 a certificate does not hold.",
     )
     parser.add_argument("inputs", nargs="+", metavar="IN", help="files to unwrap")
     parser.add_argument("-o", "--output", required=True, metavar="OUT", help="directory, or a file for a single input")

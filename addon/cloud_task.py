@@ -1,11 +1,9 @@
 """One cloud, from points to certificate; the counterpart of task.py, with the same steps."""
 
-import time
-
 import numpy as np
 
 from . import cloud_bridge, cloud_report, engine, properties
-from .task import Outcome, bounds_of, placed
+from .task import Outcome, Timer, bounds_of, placed
 
 
 class CloudTask:
@@ -23,7 +21,7 @@ class CloudTask:
         self.bounds = None
         if self.settings["use_original_bounds"]:
             self._keep_place()
-        self.started = None
+        self.timer = Timer()
 
     def _keep_place(self):
         held = cloud_bridge.read_uvs(self.cloud, self.settings["uv_map_name"])
@@ -46,12 +44,12 @@ class CloudTask:
 
     def run(self):
         """Computes the result at once."""
-        self.started = time.perf_counter()
+        self.timer.start()
         return engine.unwrap_points(self.cloud.positions, self.native)
 
     def start(self):
         """Computes the result on another thread: an `engine.Job`."""
-        self.started = time.perf_counter()
+        self.timer.start()
         return engine.submit_unwrap_points(self.cloud.positions, self.native)
 
     def check(self):
@@ -61,6 +59,7 @@ class CloudTask:
     def write(self, result, *, measure_again=True):
         """Writes a result to the points and judges what they hold afterwards. Unmapped points are put at (0, 0)."""
         del measure_again  # without faces there is nothing to measure but what is compared here at no cost
+        self.timer.start()
         mapped = (result.chart >= 0)[:, None]
         uv = np.where(mapped, result.uv, np.float32(0))
         uv = np.where(mapped, placed(uv, self.bounds), np.float32(0))
@@ -73,7 +72,7 @@ class CloudTask:
         limit = self.settings["stretch_limit"]
         found = cloud_report.measured(result, uv, held)
         certificate = cloud_report.certify(found, stretch_limit=limit, warnings=warnings)
-        seconds = time.perf_counter() - self.started
+        seconds = self.timer.seconds()
         return Outcome(
             title=self.title,
             certificate=certificate,

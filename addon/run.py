@@ -50,11 +50,20 @@ class Run:
 
     def run(self):
         """Computes all results at once."""
-        return [_named(task, task.run) for task in self.tasks]
+        results = []
+        for task in self.tasks:
+            results.append(_named(task, task.run))
+            task.timer.pause()
+        return results
 
     def start(self):
-        """Computes the results on another thread, one part after the other: a `RunJob`."""
-        return RunJob(self.tasks)
+        """Computes the results on another thread, one part after the other: a `RunJob`.
+
+        What is wrong from the start is raised here, the rest by the job's `result`.
+        """
+        job = RunJob(self.tasks)
+        job.raise_error()
+        return job
 
     def write(self, results, *, measure_again=True):
         """Writes all results, or none where one cannot be; returns an `Outcome` for each."""
@@ -102,6 +111,7 @@ class RunJob:
                 self._error = error
 
     def _keep(self, result):
+        self._task.timer.pause()
         self._results.append(result)
         self._done += self._task.element_count
         self._job = None
@@ -131,9 +141,13 @@ class RunJob:
         """The results of a finished job. Raises `engine.EngineError`, `engine.EngineCancelled`."""
         if self._cancelled:
             raise engine.EngineCancelled("cancelled")
+        self.raise_error()
+        return self._results
+
+    def raise_error(self):
+        """Raises what went wrong so far, if anything did."""
         if self._error is not None:
             raise self._error
-        return self._results
 
 
 def _named(task, call):

@@ -24,6 +24,22 @@ class Outcome:
     maps: list  # name of the UV map or point attribute of every object
 
 
+class Timer:
+    """Seconds of a task: computing and writing, without waiting for other tasks in between."""
+
+    def __init__(self):
+        self._started, self._before = None, 0.0
+
+    def start(self):
+        self._started = time.perf_counter()
+
+    def pause(self):
+        self._before, self._started = self.seconds(), None
+
+    def seconds(self):
+        return self._before + (time.perf_counter() - self._started if self._started is not None else 0.0)
+
+
 class UnwrapTask:
     """Reads the meshes when made, then computes (`run` or `start`), then writes (`write`).
 
@@ -42,7 +58,7 @@ class UnwrapTask:
         self.bounds = None
         if self.settings["use_original_bounds"]:
             self._keep_place()
-        self.started = None
+        self.timer = Timer()
 
     def _keep_place(self):
         """Packs for the part of the texture that the old UVs fill, so that margin and density come out right."""
@@ -70,12 +86,12 @@ class UnwrapTask:
 
     def run(self):
         """Computes the result at once."""
-        self.started = time.perf_counter()
+        self.timer.start()
         return engine.unwrap(self.selection, self.native, use_seams=self.use_seams)
 
     def start(self):
         """Computes the result on another thread: an `engine.Job`."""
-        self.started = time.perf_counter()
+        self.timer.start()
         return engine.submit_unwrap(self.selection, self.native, use_seams=self.use_seams)
 
     def check(self):
@@ -84,6 +100,7 @@ class UnwrapTask:
 
     def write(self, result, *, measure_again=True):
         """Writes a result to the meshes and judges what they hold afterwards."""
+        self.timer.start()
         uv = placed(result.uv, self.bounds)
         held = mesh_bridge.write_uvs(
             self.selection,
@@ -102,7 +119,7 @@ class UnwrapTask:
             except engine.EngineError as error:  # the UVs are written: say what is known
                 warnings.append(f"The written UVs could not be measured: {error}")
         certificate = engine.certify(measured, margin=margin, stretch_limit=limit, warnings=warnings)
-        seconds = time.perf_counter() - self.started
+        seconds = self.timer.seconds()
         return Outcome(
             title=self.selection.title,
             certificate=certificate,
@@ -161,4 +178,6 @@ def unwrap_objects(objects, settings, *, threads=0, progress=None):
     """
     settings = {"preset": "DEFAULT", "use_selection": False, **settings}
     task = UnwrapTask(mesh_bridge.unique_meshes(objects), settings, threads=threads)
-    return task.write(finished(task.start(), progress))
+    result = finished(task.start(), progress)
+    task.timer.pause()
+    return task.write(result)

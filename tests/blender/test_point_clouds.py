@@ -19,6 +19,7 @@ from scenes import (
     select,
     set_point_map,
     sheet_points,
+    uvs,
     vertices_only,
 )
 
@@ -332,6 +333,28 @@ def test_faces_deleted_in_edit_mode_make_it_a_cloud():
     assert len(point_map(obj)) == 8
 
 
+def test_surface_and_cloud_in_edit_mode_together(addon):
+    surface, loose = cube(), vertices_only()
+    edit(surface, loose)
+    assert unwrap() == {"FINISHED"}
+    assert {surface.mode, loose.mode} == {"EDIT"}
+    bpy.ops.mesh.select_mode(type="FACE")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert_good(surface)
+    assert_points_mapped(loose)
+    before = uvs(surface).copy()
+    set_point_map(loose, np.zeros((400, 2)))
+    surface.data.polygons.foreach_set("select", np.zeros(6, bool))
+    surface.data.vertices.foreach_set("select", np.zeros(8, bool))
+    loose.data.vertices.foreach_set("select", np.ones(400, bool))
+    bpy.context.tool_settings.mesh_select_mode = (True, False, False)
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert unwrap() == {"FINISHED"}, "no face is selected, but points are"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert_points_mapped(loose)
+    assert np.array_equal(uvs(surface), before)
+
+
 def test_shape_keys_are_left_alone():
     obj = vertices_only()
     obj.shape_key_add(name="Basis")
@@ -491,3 +514,15 @@ def test_panel_shows_what_matters(addon):
     assert "use_selection" not in of(surface, loose)
     edit(surface)
     assert "use_selection" in set(shown(settings, bpy.context, names))
+
+
+def test_seconds_of_parts_do_not_count_each_other(addon, monkeypatch):
+    task = addon("task")
+    clock = iter(range(100))
+    monkeypatch.setattr(task.time, "perf_counter", lambda: next(clock))
+    timer = task.Timer()
+    timer.start()  # 0
+    timer.pause()  # 1
+    next(clock)  # another task's time
+    timer.start()  # 3
+    assert timer.seconds() == 1 + 1
