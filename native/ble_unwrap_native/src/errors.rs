@@ -2,11 +2,11 @@
 
 use std::fmt::Display;
 
-use ble_unwrap_core::{CloudError, UnwrapError};
 use ble_unwrap_core::embedding::EmbeddingError;
 use ble_unwrap_core::mesh::MeshError;
 use ble_unwrap_core::packing::PackError;
 use ble_unwrap_core::standalone::{DistancesError, LayoutError, RepackError};
+use ble_unwrap_core::{CloudError, UnwrapError};
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;

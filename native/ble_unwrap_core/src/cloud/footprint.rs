@@ -30,7 +30,7 @@ impl Footprint {
             }
             return footprint;
         }
-        let middle = sorted.len() / 2;
+        let middle = (sorted.len() - 1) / 2;
         let typical = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
         let (low, high) = bounds(uv);
         let extent = (high.x - low.x).max(high.y - low.y);

@@ -153,7 +153,8 @@ mod tests {
     #[test]
     fn specks_in_rows_keep_the_margin() {
         for (margin, with_sheet) in [(4.0, true), (4.0, false), (0.0, true), (2.5, true)] {
-            let mut charts: Vec<_> = (0..500).map(|i| speck(f64::from(i), 1 + i as usize % 3)).collect();
+            let mut charts: Vec<_> =
+                (0..500).map(|i| speck(f64::from(i), if with_sheet { 1 + i as usize % 3 } else { 1 })).collect();
             charts.extend(with_sheet.then(sheet));
             let settings = PackSettings { margin_texels: margin, width: 256, height: 256, ..PackSettings::default() };
             let layout = lay_out(&charts, &settings, &Progress::new()).expect("they fit");

@@ -8,6 +8,7 @@ use crate::settings::Settings;
 
 use super::cells::Cells;
 use super::charting::{self, Charting, History, NodeChart};
+use super::flatten;
 use super::local_map::{Offset, Offsets, Stretch, measure_nodes};
 use super::orientation::orient;
 use super::overlap::overlapping_pairs;
@@ -30,8 +31,6 @@ const MOST_ROUNDS: usize = 6;
 pub(super) struct PieceCharts {
     /// Its points in the cloud, ascending.
     pub(super) points: Vec<u32>,
-    /// Chart of each point, counted within the piece.
-    pub(super) chart: Vec<u32>,
     /// The points of each chart, as numbers within the piece.
     pub(super) members: Vec<Vec<u32>>,
     /// Place of each point in its chart's plane, upright and at the area of the surface.
@@ -55,7 +54,8 @@ pub(super) fn charts(
     done: &(dyn Fn(usize) + Sync),
     progress: &Progress,
 ) -> Result<PieceCharts, Cancelled> {
-    if sample.len() <= CELLS_ABOVE || !settings.coarse {
+    // A plane keeps its shape to rounding, which cells would not.
+    if sample.len() <= CELLS_ABOVE || !settings.coarse || flatten::is_plane(&sample) {
         return by_points(points, sample, settings, done, progress);
     }
     by_cells(points, sample, settings, done, progress)
@@ -76,7 +76,7 @@ fn by_points(
     let overlaps = pairs(&sample, &uv, &chart).len();
     let members = charts.into_iter().map(|c| c.nodes).collect();
     let nodes = sample.len();
-    Ok(PieceCharts { points, chart, members, uv, offsets, area: sample.area, overlaps, nodes, history })
+    Ok(PieceCharts { points, members, uv, offsets, area: sample.area, overlaps, nodes, history })
 }
 
 fn by_cells(
@@ -98,12 +98,11 @@ fn by_cells(
         let fine = Fine::new(&cells, &sample, &charting.charts, progress)?;
         let bad = fine.bad_charts(&sample, settings.stretch_limit, &charting.charts);
         if bad.is_empty() || round == MOST_ROUNDS {
-            let Fine { chart, members, uv, offsets, overlaps } = fine;
+            let Fine { members, uv, offsets, overlaps, .. } = fine;
             let overlaps = overlaps.len();
             let history = charting.history;
             return Ok(PieceCharts {
                 points,
-                chart,
                 members,
                 uv,
                 offsets,
@@ -173,7 +172,7 @@ impl Fine {
         let bad = |number: &usize| {
             let stretch = measure_nodes(&self.offsets, &sample.area, &self.uv, &self.members[*number]);
             let broken = overlapping[*number] || stretch.l2 > limit || stretch.folded_share > MOST_FOLDED;
-            broken && charts[*number].nodes.len() >= super::flatten::LEAST_NODES
+            broken && charts[*number].nodes.len() >= flatten::LEAST_NODES
         };
         (0..charts.len()).filter(bad).collect()
     }

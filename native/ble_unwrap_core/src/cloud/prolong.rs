@@ -1,10 +1,12 @@
-//! From the cells of a piece to its points: moving least squares.
+//! From the cells of a piece to its points: quadratic maps of the cells, blended.
 //!
-//! Levin: The approximation power of moving least-squares, Mathematics of Computation 67, 1998. Each point gets its own
-//! affine map, fitted to the positions of the cells around it in the tangent plane with weights that fade with
-//! distance; where the map of the cells is affine the result is exact, and it is as smooth as the weights.
+//! Near each cell the map is expanded to second order in the cell's tangent plane, by least squares over the cells
+//! around; a point takes the mean of the expansions of the cells around it, with weights that fade with distance (a
+//! partition of unity: Ohtake, Belyaev, Alexa, Turk, Seidel: Multi-level partition of unity implicits, SIGGRAPH 2003).
+//! Affine maps come out exact. With expansions of first order only, a hemisphere of 100,000 points had 1.5 times the
+//! excess stretch of its cells.
 
-use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
+use nalgebra::{Matrix2, Point2, Point3, SMatrix, SVector, Vector2, Vector3};
 use rayon::prelude::*;
 
 use crate::geodesics::WeightedGraph;
@@ -13,11 +15,15 @@ use crate::progress::{Cancelled, Progress};
 use super::cells::Cells;
 use super::sample::tangents;
 
-/// Reach of the weights over the root of a cell's area: some ten cells.
+/// Reach of the blending weights over the root of a cell's area: some ten cells.
 const REACH: f64 = 1.9;
-/// Ridge of the fit, towards a rotation, over the second moments: across a line of cells, or with a single one, the
-/// map is a rotation.
-const RIDGE: f64 = 1e-6;
+/// The same for the cells that an expansion is fitted to: some twenty.
+const FIT_REACH: f64 = 2.6;
+/// Ridge of the fit over the second moments, for the linear part towards a rotation: across a line of cells, or with
+/// a single one, the map is a rotation.
+const RIDGE: f64 = 1e-7;
+/// Ridge for the quadratic part, towards zero, over the fourth moments.
+const BEND_RIDGE: f64 = 1e-3;
 
 /// The cells of a piece with a chart and a place each.
 pub(super) struct FlatCells<'a> {
@@ -38,13 +44,16 @@ impl FlatCells<'_> {
         progress: &Progress,
     ) -> Result<Vec<(Point2<f64>, Vector3<f64>)>, Cancelled> {
         let rings = self.rings();
+        let expansions: Vec<Expansion> =
+            (0..rings.len()).into_par_iter().with_min_len(64).map(|c| self.expand(c, &rings[c])).collect();
+        progress.check()?;
         position
             .par_iter()
             .zip(&self.cells.of_point)
             .with_min_len(256)
             .map(|(p, &cell)| {
                 progress.check()?;
-                Ok(self.place(p, cell as usize, &rings[cell as usize]))
+                Ok(self.place(p, cell as usize, &rings[cell as usize], &expansions))
             })
             .collect()
     }
@@ -68,45 +77,90 @@ impl FlatCells<'_> {
             .collect()
     }
 
-    fn place(&self, p: &Point3<f64>, cell: usize, ring: &[u32]) -> (Point2<f64>, Vector3<f64>) {
+    /// The expansion of the map at a cell, fitted to the cells of its ring.
+    fn expand(&self, cell: usize, ring: &[u32]) -> Expansion {
         let sample = &self.cells.sample;
-        let reach = REACH * sample.area[cell].sqrt();
-        let weight = |c: u32| {
-            let t = (p - sample.position[c as usize]).norm_squared() / (reach * reach);
-            // The cell's own mean may be out of reach where cells are long; its weight must not vanish.
-            let faded = (1.0 - t).max(0.0).powi(2);
-            if c as usize == cell { faded.max(1e-3) } else { faded }
-        };
-        let mut normal = Vector3::zeros();
-        let (mut sum, mut mean, mut image) = (0.0, Vector3::zeros(), Vector2::zeros());
-        for &c in ring {
-            let w = weight(c);
-            normal += self.normal[c as usize] * w;
-            mean += sample.position[c as usize].coords * w;
-            image += self.uv[c as usize].coords * w;
+        let frame = tangents(&self.normal[cell]);
+        let unit = FIT_REACH * sample.area[cell].sqrt();
+        // Coordinates in units of the reach: moments of order one.
+        let mut moment = SMatrix::<f64, 5, 5>::zeros();
+        let mut mixed = SMatrix::<f64, 5, 2>::zeros();
+        let (mut dot, mut cross, mut sum) = (0.0, 0.0, 0.0);
+        for &c in ring.iter().filter(|&&c| c as usize != cell) {
+            let d = sample.position[c as usize] - sample.position[cell];
+            let w = (1.0 - d.norm_squared() / (unit * unit)).max(1e-3).powi(2);
+            let x = Vector2::new(frame[0].dot(&d), frame[1].dot(&d)) / unit;
+            let image = self.uv[c as usize] - self.uv[cell];
+            let basis = basis(&x);
+            moment += basis * basis.transpose() * w;
+            mixed += basis * image.transpose() * w;
+            dot += w * x.dot(&image);
+            cross += w * x.perp(&image);
             sum += w;
         }
-        let (mean, image) = (mean / sum, image / sum);
-        let normal = normal.try_normalize(1e-9).unwrap_or(self.normal[cell]);
-        let [a, b] = tangents(&normal);
-        let flat = |d: Vector3<f64>| Vector2::new(a.dot(&d), b.dot(&d));
-        let (mut moment, mut mixed) = (Matrix2::zeros(), Matrix2::zeros());
-        for &c in ring {
-            let w = weight(c);
-            if w > 0.0 {
-                let x = flat(sample.position[c as usize].coords - mean);
-                moment += x * x.transpose() * w;
-                mixed += (self.uv[c as usize].coords - image) * x.transpose() * w;
+        let turn = Vector2::new(dot, cross).try_normalize(f64::MIN_POSITIVE).unwrap_or_else(Vector2::x);
+        let rotation = Matrix2::new(turn.x, -turn.y, turn.y, turn.x) * unit;
+        for k in 0..5 {
+            let ridge = if k < 2 { RIDGE } else { BEND_RIDGE } * sum.max(RIDGE);
+            moment[(k, k)] += ridge;
+            if k < 2 {
+                for c in 0..2 {
+                    mixed[(k, c)] += ridge * rotation[(c, k)];
+                }
             }
         }
-        let turn = Vector2::new(mixed.m11 + mixed.m22, mixed.m21 - mixed.m12);
-        let turn = turn.try_normalize(f64::MIN_POSITIVE).unwrap_or_else(Vector2::x);
-        let rotation = Matrix2::new(turn.x, -turn.y, turn.y, turn.x);
-        let ridge = RIDGE * moment.trace().max(RIDGE * reach * reach);
-        moment += Matrix2::identity() * ridge;
-        let map = moment.try_inverse().map_or(rotation, |inverse| (mixed + rotation * ridge) * inverse);
-        (Point2::from(image + map * flat(p.coords - mean)), normal)
+        let map = moment.cholesky().map_or_else(
+            || {
+                let mut map = SMatrix::<f64, 5, 2>::zeros();
+                map.fixed_view_mut::<2, 2>(0, 0).copy_from(&rotation.transpose());
+                map
+            },
+            |factor| factor.solve(&mixed),
+        );
+        Expansion { frame, unit, map }
     }
+
+    fn place(
+        &self,
+        p: &Point3<f64>,
+        cell: usize,
+        ring: &[u32],
+        expansions: &[Expansion],
+    ) -> (Point2<f64>, Vector3<f64>) {
+        let sample = &self.cells.sample;
+        let reach = REACH * sample.area[cell].sqrt();
+        let (mut normal, mut place, mut sum) = (Vector3::zeros(), Vector2::zeros(), 0.0);
+        for &c in ring {
+            let d = p - sample.position[c as usize];
+            let faded = (1.0 - d.norm_squared() / (reach * reach)).max(0.0).powi(2);
+            // The cell's own mean may be out of reach where cells are long; its weight must not vanish.
+            let w = if c as usize == cell { faded.max(1e-3) } else { faded };
+            if w > 0.0 {
+                normal += self.normal[c as usize] * w;
+                place += (self.uv[c as usize].coords + expansions[c as usize].at(&d)) * w;
+                sum += w;
+            }
+        }
+        (Point2::from(place / sum), normal.try_normalize(1e-9).unwrap_or(self.normal[cell]))
+    }
+}
+
+/// The map near a cell, relative to the cell's place.
+struct Expansion {
+    frame: [Vector3<f64>; 2],
+    unit: f64,
+    map: SMatrix<f64, 5, 2>,
+}
+
+impl Expansion {
+    fn at(&self, d: &Vector3<f64>) -> Vector2<f64> {
+        let x = Vector2::new(self.frame[0].dot(d), self.frame[1].dot(d)) / self.unit;
+        self.map.tr_mul(&basis(&x))
+    }
+}
+
+fn basis(x: &Vector2<f64>) -> SVector<f64, 5> {
+    SVector::<f64, 5>::new(x.x, x.y, x.x * x.x, x.x * x.y, x.y * x.y)
 }
 
 #[cfg(test)]

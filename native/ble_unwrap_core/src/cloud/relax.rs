@@ -292,8 +292,14 @@ mod tests {
     use crate::cloud::local_map::{Offset, measure, tests::sheet};
     use nalgebra::Point3;
 
+    /// The same positions, mirrored if the normals look down.
+    fn upright(offsets: &Offsets, area: &[f64], uv: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
+        let side = if measure(offsets, area, &uv).mirrored { -1.0 } else { 1.0 };
+        uv.into_iter().map(|p| Point2::new(side * p.x, p.y)).collect()
+    }
+
     fn relaxed(offsets: &Offsets, area: &[f64], start: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
-        let mut uv = start;
+        let mut uv = upright(offsets, area, start);
         relax(offsets, area, &mut uv, &Progress::new()).expect("not cancelled");
         uv
     }
@@ -306,7 +312,7 @@ mod tests {
             plane.iter().map(|p| Point2::new(1.1 * p.x + 0.1 * p.y * p.y, p.y + 0.05 * (3.0 * p.x).sin())).collect();
         let uv = relaxed(&offsets, &sample.area, start);
         let stretch = measure(&offsets, &sample.area, &uv);
-        assert!(stretch.l2 < 1.0 + 1e-6, "{}", stretch.l2);
+        assert!(stretch.l2 < 1.0 + 1e-5, "{}", stretch.l2);
     }
 
     #[test]
@@ -338,7 +344,7 @@ mod tests {
         let offsets = Offsets::new(&sample, Offset::Unbent);
         let spokes = Spokes { offsets: &offsets, weight: vec![1.0; offsets.len()] };
         let map = Matrix2::new(1.3, 0.2, -0.4, 0.8);
-        let uv: Vec<_> = plane.iter().map(|p| map * p).collect();
+        let uv = upright(&offsets, &sample.area, plane.iter().map(|p| map * p).collect());
         let (square, rotation) = spokes.proxy(40, &uv);
         let [a, b] = sample_frame(&offsets, 40, &uv);
         let slope = square * (a - rotation) * 2.0;

@@ -1,25 +1,40 @@
 //! Cutting a chart that does not flatten: a label a node is all it takes, there is no surface to cut.
 //!
-//! Representatives and growth as for meshes (iso-charts, section 4.1; see [`crate::segmentation`]): the ends of the
+//! Representatives and growth as for meshes (iso-charts, section 4.1; see [`crate::segmentation`]): the ends of a
 //! leading spectral dimension, then every node to the nearer one along the graph.
 
 use std::collections::VecDeque;
 
 use crate::geodesics::{LandmarkDistances, WeightedGraph};
+use crate::mesh::VertexId;
 use crate::segmentation::SpectralAnalysis;
 
 /// Parts of fewer nodes, or of less than this share of the chart, go to a neighbour.
 const LEAST_PART: usize = 4;
 const LEAST_SHARE: f64 = 0.01;
+/// Dimensions tried.
+const MOST_DIMENSIONS: usize = 4;
+/// A later dimension is taken if it leaves less than this share of what an earlier one leaves out of the plane.
+const CLEARLY: f64 = 0.7;
 
-/// Splits a connected chart in two or more connected parts along its leading spectral dimensions. `None` if that leaves
-/// one part; [`halves`] always does.
+/// Splits a connected chart in two or more connected parts. `None` if that leaves one part; [`halves`] always does.
+///
+/// Of the splits across each of the leading dimensions the one is taken whose parts are most planar, as the distances
+/// known say: across a ball, but along a tube, which shorter tubes would not help.
 pub(super) fn spectral_parts(
     graph: &WeightedGraph,
     distances: &LandmarkDistances,
     analysis: &SpectralAnalysis,
 ) -> Option<Vec<Vec<u32>>> {
-    let [first, second] = ends(distances, analysis)?;
+    let mut best: Option<(f64, [usize; 2])> = None;
+    for d in 0..analysis.eigenvalues.len().min(MOST_DIMENSIONS) {
+        let Some(ends) = ends(distances, analysis, d) else { continue };
+        let bent = bent_share(distances, ends);
+        if best.is_none_or(|(least, _)| bent < least * CLEARLY) {
+            best = Some((bent, ends));
+        }
+    }
+    let [first, second] = best?.1;
     let (a, b) = (distances.row(first), distances.row(second));
     let label: Vec<u32> = a.iter().zip(b).map(|(a, b)| u32::from(b < a)).collect();
     parts_of(graph, label)
@@ -38,25 +53,28 @@ pub(super) fn halves(graph: &WeightedGraph) -> Vec<Vec<u32>> {
     collect(&component, count)
 }
 
-/// The two landmarks, of those of least and greatest coordinate in each dimension, that lie farthest apart.
-fn ends(distances: &LandmarkDistances, analysis: &SpectralAnalysis) -> Option<[usize; 2]> {
-    let mut candidates = Vec::new();
-    for d in 0..analysis.dimension.max(1).min(analysis.eigenvalues.len()) {
-        let by =
-            |a: &usize, b: &usize| analysis.coordinate(*a, d).total_cmp(&analysis.coordinate(*b, d)).then(a.cmp(b));
-        candidates.extend((0..distances.len()).min_by(by));
-        candidates.extend((0..distances.len()).max_by(by));
+/// The landmarks of least and greatest coordinate in a dimension, if they are apart.
+fn ends(distances: &LandmarkDistances, analysis: &SpectralAnalysis, dimension: usize) -> Option<[usize; 2]> {
+    let by = |a: &usize, b: &usize| {
+        analysis.coordinate(*a, dimension).total_cmp(&analysis.coordinate(*b, dimension)).then(a.cmp(b))
+    };
+    let (a, b) = ((0..distances.len()).min_by(by)?, (0..distances.len()).max_by(by)?);
+    (distances.get(a, distances.landmarks()[b]) > 0.0).then_some([a, b])
+}
+
+/// How much of the landmarks' energy lies outside a plane once they are parted by the nearer of two of them.
+fn bent_share(distances: &LandmarkDistances, ends: [usize; 2]) -> f64 {
+    let at = |end: usize, l: usize| distances.get(ends[end], distances.landmarks()[l]);
+    let mut bent = 0.0;
+    for side in [false, true] {
+        let part: Vec<usize> = (0..distances.len()).filter(|&l| (at(1, l) < at(0, l)) == side).collect();
+        let ids = part.iter().map(|&l| distances.landmarks()[l]).collect::<Vec<_>>();
+        // The part's landmarks as a cloud of their own: their rows, cut down to their columns.
+        let rows = part.iter().flat_map(|&l| ids.iter().map(move |&v| distances.get(l, v) as f32)).collect();
+        let own = LandmarkDistances::new((0..ids.len()).map(VertexId::new).collect(), ids.len(), rows);
+        bent += part.len() as f64 * (1.0 - SpectralAnalysis::new(&own).planarity);
     }
-    let mut best: Option<(f64, [usize; 2])> = None;
-    for (i, &a) in candidates.iter().enumerate() {
-        for &b in &candidates[..i] {
-            let apart = distances.get(a, distances.landmarks()[b]);
-            if apart > 0.0 && best.is_none_or(|(most, _)| apart > most) {
-                best = Some((apart, [b, a]));
-            }
-        }
-    }
-    best.map(|b| b.1)
+    bent / distances.len().max(1) as f64
 }
 
 /// Connected parts of equal label, fragments joined to a neighbour; `None` if only one is left.
@@ -135,7 +153,6 @@ fn breadth_first(graph: &WeightedGraph, start: usize) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::VertexId;
     use crate::progress::Progress;
 
     fn lattice(width: usize, height: usize) -> WeightedGraph {
