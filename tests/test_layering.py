@@ -226,13 +226,17 @@ def tops(names: set[str]) -> set[str]:
 
 # File of the add-on -> what it never imports.
 NEVER = {
-    "mesh_bridge.py": {".engine", "ble_unwrap_native"},
+    "mesh_bridge.py": {".engine", ".cloud_bridge", "ble_unwrap_native"},
+    "cloud_bridge.py": {".engine", "ble_unwrap_native"},
+    "point_file.py": {"bpy", "bmesh", ".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "targets.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "cloud_report.py": {"bpy", "bmesh", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
     "operators": {"ble_unwrap_native"},
-    "panel.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
-    "menu.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
-    "preferences.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
-    "properties.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
-    "engine.py": {"bpy", "bmesh", ".mesh_bridge", ".operators", ".properties"},
+    "panel.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "menu.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "preferences.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "properties.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "engine.py": {"bpy", "bmesh", ".mesh_bridge", ".cloud_bridge", ".operators", ".properties"},
 }
 
 
