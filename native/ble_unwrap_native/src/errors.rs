@@ -6,7 +6,8 @@ use ble_unwrap_core::UnwrapError;
 use ble_unwrap_core::embedding::EmbeddingError;
 use ble_unwrap_core::mesh::MeshError;
 use ble_unwrap_core::packing::PackError;
-use ble_unwrap_core::standalone::{DistancesError, LayoutError, RepackError};
+use ble_unwrap_core::standalone::{DistancesError, FlattenError, LayoutError, RepackError};
+use ble_unwrap_core::stretch::StretchError;
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -168,6 +169,35 @@ impl Raised for DistancesError {
         match self {
             Self::Mesh(error) => error.kind(),
             Self::Source { .. } | Self::TooLarge { .. } => Kind::Argument,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
+impl Raised for FlattenError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Mesh(error) => error.kind(),
+            Self::Setting(error) => error.kind(),
+            Self::NoFaces
+            | Self::NoArea
+            | Self::NotFinite { .. }
+            | Self::Pieces { .. }
+            | Self::Closed
+            | Self::Handles { .. }
+            | Self::Pinched { .. }
+            | Self::DoubledEdge { .. } => Kind::Mesh,
+            Self::TooManyLandmarks { .. } => Kind::Argument,
+            // The data are distances of the mesh: what is wrong with them is wrong with it.
+            Self::Embedding(
+                EmbeddingError::TooFewLandmarks { .. }
+                | EmbeddingError::Unreachable { .. }
+                | EmbeddingError::NoExtent
+                | EmbeddingError::Collinear { .. },
+            ) => Kind::Mesh,
+            Self::Embedding(error) => error.kind(),
+            Self::Stretch(StretchError::NotInjective) => Kind::Mesh,
+            Self::Stretch(_) => Kind::Internal,
             Self::Cancelled(error) => error.kind(),
         }
     }

@@ -4,6 +4,7 @@ mod arrays;
 mod distances;
 mod embed;
 mod errors;
+mod flatten;
 mod job;
 mod measure;
 mod owned_array;
@@ -24,6 +25,8 @@ mod native {
     use crate::distances::geodesic_distances;
     #[pymodule_export]
     use crate::embed::{Embedding, embed};
+    #[pymodule_export]
+    use crate::flatten::{Flattening, flatten};
     #[pymodule_export]
     use crate::job::Job;
     #[pymodule_export]

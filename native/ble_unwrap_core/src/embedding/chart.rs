@@ -39,6 +39,8 @@ pub struct ChartEmbedding {
     pub converged: bool,
     /// Log-likelihood (4) of the landmarks; `None` for Isomap.
     pub log_likelihood: Option<f64>,
+    /// That at the start and after each sweep; empty for Isomap.
+    pub trace: Vec<f64>,
 }
 
 /// Embeds a chart in the plane by the geodesic distances of its landmarks.
@@ -78,7 +80,8 @@ pub fn embed_chart(
         let uv = isomap::place_all(mds, distances, progress)?;
         let uv = with_landmarks(uv, distances, |l| Point2::new(mds.point(l)[0], mds.point(l)[1]));
         let sigma = mean_squared;
-        return Ok(ChartEmbedding { uv, landmarks: k, sigma, sweeps: 0, converged: true, log_likelihood: None });
+        let (log_likelihood, trace) = (None, Vec::new());
+        return Ok(ChartEmbedding { uv, landmarks: k, sigma, sweeps: 0, converged: true, log_likelihood, trace });
     }
 
     let kernel = settings.kernel();
@@ -110,6 +113,7 @@ pub fn embed_chart(
         sweeps: fit.sweeps,
         converged: fit.converged,
         log_likelihood: Some(fit.log_likelihood),
+        trace: fit.trace,
     })
 }
 

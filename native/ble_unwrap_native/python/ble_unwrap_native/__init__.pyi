@@ -11,6 +11,7 @@ __all__ = [
     "BleUnwrapError",
     "Cancelled",
     "Embedding",
+    "Flattening",
     "InternalError",
     "InvalidArgumentError",
     "InvalidMeshError",
@@ -19,6 +20,7 @@ __all__ = [
     "__version__",
     "default_settings",
     "embed",
+    "flatten",
     "geodesic_distances",
     "measure",
     "pack",
@@ -36,7 +38,7 @@ class InternalError(BleUnwrapError): ...
 
 @type_check_only
 class _Threads(TypedDict, total=False):
-    preset: Literal["default", "paper"]
+    preset: Literal["default", "paper", "iso_charts"]
     threads: int
 
 @type_check_only
@@ -64,18 +66,22 @@ class _PackSettings(_MeasureSettings, total=False):
     rotation: Literal["any", "quarter", "none"]
 
 @type_check_only
-class _Settings(_GeodesicSettings, _EmbeddingSettings, _PackSettings, total=False):
-    stretch_limit: float
+class _FlattenSettings(_GeodesicSettings, _EmbeddingSettings, total=False):
     weld: bool
+    landmark_fraction: float
+    landmark_min: int
+    landmark_max: int | None
+    together_max: int
+    stretch_solver: Literal["newton", "line_search"]
+    stretch_iterations: int
+
+@type_check_only
+class _Settings(_FlattenSettings, _PackSettings, total=False):
+    stretch_limit: float
     coarse: bool
     merge: bool
     holes: Literal["keep", "cut"]
     chart_scale: Literal["uniform", "stretch"]
-    landmark_fraction: float
-    landmark_min: int
-    landmark_max: int | None
-    stretch_solver: Literal["newton", "line_search"]
-    stretch_iterations: int
 
 @final
 class Array(Buffer):
@@ -102,6 +108,15 @@ class Embedding:
     def coordinates(self) -> Array: ...
     @property
     def intercepts(self) -> Array: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
+
+@final
+class Flattening:
+    @property
+    def embedded(self) -> Array: ...
+    @property
+    def uv(self) -> Array: ...
     @property
     def report(self) -> dict[str, Any]: ...
 
@@ -152,6 +167,16 @@ def embed(
     job: Job | None = None,
     **settings: Unpack[_EmbeddingSettings],
 ) -> Embedding: ...
+def flatten(
+    positions: Buffer,
+    corner_vertices: Buffer,
+    face_offsets: Buffer,
+    *,
+    corner_triangles: Buffer | None = None,
+    minimise: bool = True,
+    job: Job | None = None,
+    **settings: Unpack[_FlattenSettings],
+) -> Flattening: ...
 def geodesic_distances(
     positions: Buffer,
     corner_vertices: Buffer,
@@ -181,4 +206,4 @@ def pack(
     job: Job | None = None,
     **settings: Unpack[_PackSettings],
 ) -> PackedCharts: ...
-def default_settings(preset: Literal["default", "paper"] = "default") -> dict[str, Any]: ...
+def default_settings(preset: Literal["default", "paper", "iso_charts"] = "default") -> dict[str, Any]: ...
