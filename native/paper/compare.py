@@ -78,29 +78,26 @@ def compare_patches(patches, methods=None):
 
 
 def charts_of(mesh, **settings):
-    """The charts of an unwrap that a figure can be had of: at least 50 faces."""
+    """An unwrap and its charts as meshes, opened where the atlas is; those of fewer than 50 faces are left out."""
     atlas = ble.unwrap(*mesh.arrays, **settings)
-    chart = np.asarray(atlas.chart)
+    chart, uv = np.asarray(atlas.chart), np.asarray(atlas.uv)
     names, count = np.unique(chart[chart >= 0], return_counts=True)
-    return atlas, [mesh.part(chart == c, f"{mesh.name} {c + 1}") for c in names[count >= 50]]
+    key = np.concatenate([mesh.corner_vertices[:, None].astype(np.float64), uv], axis=1)
+    _, first, place = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    opened = shapes.Mesh(
+        mesh.name,
+        mesh.positions[mesh.corner_vertices[first]],
+        place.reshape(-1).astype(np.int32),
+        mesh.face_offsets,
+        mesh.view,
+    )
+    return atlas, [opened.part(chart == c, f"{mesh.name} {c + 1}") for c in names[count >= 50]]
 
 
 def compare_charts(mesh, methods=None):
-    """The charts of an unwrap (by the default settings, so the charts are nobody's choice but its), by each method."""
+    """The charts of an unwrap (by the default settings) by each method."""
     _, charts = charts_of(mesh)
-    return [row for chart in _flat_enough(charts) for row in compare_patches([chart], methods or CHART_METHODS)]
-
-
-def _flat_enough(charts):
-    """Charts that `flatten` takes: where unwrap has cut a chart open along a path inside it, its faces alone are no patch."""
-    taken = []
-    for chart in charts:
-        try:
-            ble.flatten(*chart.arrays, minimise=False)
-        except ble.InvalidMeshError:
-            continue
-        taken.append(chart)
-    return taken
+    return compare_patches(charts, methods or CHART_METHODS)
 
 
 def milliseconds(seconds):
