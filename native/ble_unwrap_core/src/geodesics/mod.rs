@@ -14,7 +14,7 @@ mod min_heap;
 mod settings;
 mod weighted_graph;
 
-pub use dijkstra::{DijkstraScratch, dijkstra, graph_distances};
+pub use dijkstra::{DijkstraScratch, dijkstra, dijkstra_within, graph_distances, graph_distances_within};
 pub use fast_marching::{FastMarching, MarchScratch};
 pub use knn_graph::knn_graph;
 pub use landmark_distances::LandmarkDistances;
