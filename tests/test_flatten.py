@@ -102,8 +102,11 @@ def test_unit_pose_and_unused_vertices():
     flat = native.flatten(positions, corners, offsets)
     for uv in (np.asarray(flat.embedded), np.asarray(flat.uv)):
         assert np.isnan(uv[-1]).all()
-        assert np.allclose(np.ptp(uv[:-1], axis=0), (30, 10), rtol=1e-4)
-    assert abs(np.asarray(flat.embedded)[:-1].mean(axis=0)).max() < 1e-3
+        plane = np.linalg.norm(uv[:-1, None] - uv[None, :-1], axis=2)
+        sheet = np.linalg.norm(positions[:-1, None] - positions[None, :-1], axis=2)
+        assert np.allclose(plane, sheet, atol=1e-4)
+        # The diagonals of the quads all run one way, which turns the principal axes a little.
+        assert np.allclose(np.ptp(uv[:-1], axis=0), (30, 10), rtol=0.02)
     assert flat.report["l2_before"] < 1 + 1e-6
 
 

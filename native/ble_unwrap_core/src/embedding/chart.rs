@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::Progress;
 use crate::geodesics::LandmarkDistances;
-use crate::linalg::{Mds, classical_mds};
+use crate::linalg::{EigenError, Mds, leading_mds};
 use crate::mesh::VertexId;
 
 use super::affinity::{Affinity, KernelWidth, kernel_width};
@@ -19,6 +19,8 @@ use super::settings::{EmbeddingSettings, Initial, Model};
 /// Least extent along the second principal axis over the first: distances are kept to 6e-8, and the second
 /// eigenvalue, its square, drowns in their rounding below about 1e-8.
 const LEAST_ASPECT: f64 = 1e-4;
+/// Residual of the two eigenpairs over the larger eigenvalue: below the rounding of the distances.
+const SCALING_TOLERANCE: f64 = 1e-9;
 /// Deviation of each coordinate of a random start, in units of √σ. At 1e-4 the first steps
 /// explode, since the bound is nearly singular; at ½ no start tried did.
 const RANDOM_DEVIATION: f64 = 0.5;
@@ -72,7 +74,7 @@ pub fn embed_chart(
     squared.iter_mut().for_each(|d| *d *= *d);
 
     let mds = match (settings.model, settings.initial) {
-        (Model::Isomap, _) | (_, Initial::Mds) => Some(planar_mds(&squared, k)?),
+        (Model::Isomap, _) | (_, Initial::Mds) => Some(planar_mds(&squared, k, progress)?),
         (_, Initial::Random) => None,
     };
     progress.check()?;
@@ -136,8 +138,11 @@ fn mean_squared_distance(distances: &LandmarkDistances) -> Result<f64, Embedding
 }
 
 /// Classical scaling of the landmarks, which must span a plane.
-fn planar_mds(squared: &[f64], k: usize) -> Result<Mds, EmbeddingError> {
-    let mds = classical_mds(squared, k, 2)?;
+fn planar_mds(squared: &[f64], k: usize, progress: &Progress) -> Result<Mds, EmbeddingError> {
+    let mds = leading_mds(squared, k, 2, SCALING_TOLERANCE, progress).map_err(|error| match error {
+        EigenError::Cancelled(cancelled) => EmbeddingError::Cancelled(cancelled),
+        other => EmbeddingError::Eigen(other),
+    })?;
     let [first, second] = [mds.eigenvalues[0], mds.eigenvalues[1].max(0.0)];
     if first.is_nan() || first <= 0.0 {
         return Err(EmbeddingError::NoExtent);
