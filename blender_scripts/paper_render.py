@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import addon_loader
 import render
 
-DARK = 0.42  # of the checker's dark fields, as a share of the light ones
+DARK = 0.5  # of the checker's dark fields, as a share of the light ones
 BARE = (0.62, 0.66, 0.72)
 
 
@@ -105,9 +105,10 @@ def picture(job):
     render.VIEW_FROM = tuple(job["view"])
     camera = render.place_camera(scene, render.world_points([obj]), job["size"][0] / job["size"][1])
     key, world = render.place_lights(scene, camera)
-    key.data.energy, key.data.angle = 2.2, math.radians(30)
+    key.data.energy, key.data.angle = 2.6, math.radians(12)
     background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
     background.inputs["Color"].default_value = (0.9, 0.93, 1.0, 1.0)
+    background.inputs["Strength"].default_value = 0.38
     scene.render.filepath = job["picture"]
     bpy.ops.render.render(write_still=True)
 

@@ -16,6 +16,7 @@ from PIL import Image
 FACE = "#b9cbe0"
 FLIPPED = "#e0218a"
 EDGE = "#33445a"
+DARKEST = 0.5  # of a surface, where no light falls
 DPI = 110
 COLOURS = 200  # of a saved picture: enough for shading, and a third of the size
 # Of charts, light enough for a checker upon them.
@@ -58,7 +59,7 @@ def draw_surface(axes, mesh):
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-30)[:, None]
     normal *= np.sign(normal @ backward)[:, None]
     light = -0.45 * right + 0.6 * up + 0.66 * backward
-    shade = 0.35 + 0.65 * np.clip(normal @ light, 0, 1)
+    shade = DARKEST + (1 - DARKEST) * np.clip(normal @ light, 0, 1)
     tint = np.array(matplotlib.colors.to_rgb(FACE))
     order = np.argsort(corners.mean(axis=1) @ backward)
     flat = np.stack([corners @ right, corners @ up], axis=-1)
@@ -80,7 +81,7 @@ def shade_of(points, light, backward, tint):
     normal = sum(np.cross(points[k], points[(k + 1) % len(points)]) for k in range(len(points)))
     normal = normal / max(np.linalg.norm(normal), 1e-30)
     normal = normal * (np.sign(normal @ backward) or 1.0)
-    return np.clip((0.35 + 0.65 * max(normal @ light, 0)) * tint * 1.12, 0, 1)
+    return np.clip((DARKEST + (1 - DARKEST) * max(normal @ light, 0)) * tint * 1.15, 0, 1)
 
 
 def frame(axes, points, half=None):
@@ -116,7 +117,7 @@ def draw_map(axes, mesh, uv, half):
     axes.add_collection(LineCollection(uv[edges], colors=EDGE, linewidths=0.22))
     if wrong.any():
         shape = uv[triangles[wrong]]
-        axes.add_collection(PolyCollection(shape, facecolors=FLIPPED, edgecolors=FLIPPED, linewidths=0.5, alpha=0.8))
+        axes.add_collection(PolyCollection(shape, facecolors=FLIPPED, edgecolors=FLIPPED, linewidths=0.5, alpha=0.65))
     frame(axes, uv, half)
 
 
@@ -142,8 +143,28 @@ def figure_2a(mesh, rows, path):
         name = "the model as printed" if report["model"] == "paper" else "the default model"
         milliseconds = compare.milliseconds(report["seconds"]["embedding"])
         axes.set_title(f"{name}: {report['sweeps']} sweeps, {milliseconds} ms\n{flips_text(report, 'before')}")
-    figure.subplots_adjust(left=0.01, right=0.99, bottom=0.01, top=0.87, wspace=0.02)
+        if report["flips_before"]:
+            magnify_flips(axes, mesh, uv, half)
+    figure.subplots_adjust(left=0.01, right=0.99, bottom=0.02, top=0.87, wspace=0.1)
     save(figure, path)
+
+
+def magnify_flips(axes, mesh, uv, half, share=0.13):
+    """An inset upon the middle of the map: where most of the flips at its lower edge are, several times larger."""
+    centre = uv[mesh.triangles()[compare.flipped(mesh, uv)]].mean(axis=1)
+    lower = centre[centre[:, 1] < np.nanmean(uv[:, 1])]
+    if not len(lower):
+        lower = centre
+    place = np.median(lower, axis=0)
+    inset = axes.inset_axes([0.28, 0.3, 0.44, 0.44])
+    draw_map(inset, mesh, uv, None)
+    inset.collections[-1].set_linewidth(0)
+    inset.set_xlim(place[0] - share * half, place[0] + share * half)
+    inset.set_ylim(place[1] - share * half, place[1] + share * half)
+    inset.axis("on")
+    inset.set_xticks([])
+    inset.set_yticks([])
+    axes.indicate_inset_zoom(inset, edgecolor="black", alpha=0.8)
 
 
 def show(axes, path):

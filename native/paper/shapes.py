@@ -29,15 +29,18 @@ class Mesh:
         """The corners of every face, as a list of arrays."""
         return np.split(self.corner_vertices, self.face_offsets[1:-1])
 
-    def triangles(self):
-        """Vertices of a fan of triangles a face, (t, 3)."""
+    def corner_triangles(self):
+        """Corners of a fan of triangles a face, (t, 3)."""
         sizes = np.diff(self.face_offsets)
         parts = []
         for size in np.unique(sizes):
             corner = self.face_offsets[:-1][sizes == size][:, None] + np.arange(size)
-            vertex = self.corner_vertices[corner]
-            parts += [vertex[:, [0, k, k + 1]] for k in range(1, size - 1)]
-        return np.concatenate(parts)
+            parts += [corner[:, [0, k, k + 1]] for k in range(1, size - 1)]
+        return np.concatenate(parts).astype(np.int32)
+
+    def triangles(self):
+        """Vertices of the same triangles."""
+        return self.corner_vertices[self.corner_triangles()]
 
     def part(self, faces, name):
         """Some of the faces as a mesh of their own; a mask or indices."""
@@ -195,7 +198,18 @@ def largest_piece(mesh, name):
 
 
 def surface_net(name, distance, low, high, cell, **more):
-    """The zero surface of a function as nearly square quads: a vertex a mixed cell, at the mean of its crossings."""
+    """The zero surface of a function as nearly square quads, its largest piece; manifold."""
+    for attempt in range(16):
+        # Once in a while two sheets of the net meet in one cell; a shifted grid parts them.
+        mesh = _surface_net(name, distance, np.asarray(low, float) - 0.137 * attempt * cell, high, cell, **more)
+        edges = np.concatenate([np.stack([p, np.roll(p, -1)], axis=1) for p in mesh.polygons()])
+        if len(np.unique(edges, axis=0)) == len(edges):
+            break
+    return mesh
+
+
+def _surface_net(name, distance, low, high, cell, **more):
+    """A vertex a mixed cell, at the mean of the crossings of its edges; a quad an edge that the surface crosses."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     count = np.ceil((high - low) / cell).astype(int) + 1
     axes = [low[k] + cell * np.arange(count[k]) for k in range(3)]
