@@ -334,42 +334,6 @@ def test_settings_that_contradict_each_other_are_named(square):
 # The single steps ---------------------------------------------------------------------------------------------------
 
 
-def test_geodesic_distances_on_a_flat_sheet():
-    positions, corners, offsets = sheet = grid(24, 16)
-    sources = np.array([0, 24, 212])
-    d = np.asarray(native.geodesic_distances(*sheet, sources))
-    assert d.shape == (3, len(positions)) and d.dtype == np.float32
-    exact = np.linalg.norm(positions[sources, None] - positions[None], axis=-1)
-    np.testing.assert_allclose(d, exact, atol=1e-5)
-    along_edges = np.asarray(native.geodesic_distances(*sheet, sources, geodesics="dijkstra", threads=1))
-    assert (along_edges >= d - 1e-5).all() and along_edges.max() > d.max() + 0.01
-    scaled = native.geodesic_distances(1e3 * positions + 7, corners, offsets, sources)
-    np.testing.assert_allclose(np.asarray(scaled), 1e3 * exact, atol=1e-2)
-
-
-def test_geodesic_distances_that_do_not_exist_are_infinite():
-    positions, corners, offsets = grid(2, 2)
-    two = (
-        np.concatenate([positions, positions + 5, [[9, 9, 9]]]),
-        np.concatenate([corners, corners + len(positions)]),
-        np.concatenate([offsets, offsets[1:] + len(corners)]),
-    )
-    d = np.asarray(native.geodesic_distances(*two, np.array([0, 18])))
-    assert np.isfinite(d[0, :9]).all() and np.isinf(d[0, 9:]).all()
-    assert d[1, 18] == 0 and np.isinf(d[1, :18]).all()
-
-
-def test_geodesic_distances_name_what_is_wrong(square):
-    with pytest.raises(native.InvalidArgumentError, match="source 1 is vertex 4, but the vertices are numbered 0 to 4"):
-        native.geodesic_distances(*square, np.array([0, 4]))
-    with pytest.raises(native.InvalidArgumentError, match=r"sources: expected an int32 or int64 array of shape \(k,\)"):
-        native.geodesic_distances(*square, 0)
-    with pytest.raises(native.InvalidArgumentError, match=r"geodesic_distances\(\) has no setting 'model'"):
-        native.geodesic_distances(*square, np.array([0]), model="paper")
-    with pytest.raises(native.InvalidMeshError, match="vertex 9"):
-        native.geodesic_distances(square[0], np.array([0, 1, 3, 9]), square[2], np.array([0]))
-
-
 def test_measure_agrees_with_the_report_of_unwrap(ball):
     atlas = native.unwrap(*ball, texture_size=256, margin=2)
     measured = native.measure(*ball, atlas.uv, texture_size=256, margin=2)

@@ -6,7 +6,7 @@ use ble_unwrap_core::UnwrapError;
 use ble_unwrap_core::embedding::EmbeddingError;
 use ble_unwrap_core::mesh::MeshError;
 use ble_unwrap_core::packing::PackError;
-use ble_unwrap_core::standalone::{DistancesError, FlattenError, LayoutError, RepackError};
+use ble_unwrap_core::standalone::{CloudError, DistancesError, FlattenError, LayoutError, RepackError};
 use ble_unwrap_core::stretch::StretchError;
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
@@ -198,6 +198,20 @@ impl Raised for FlattenError {
             Self::Embedding(error) => error.kind(),
             Self::Stretch(StretchError::NotInjective) => Kind::Mesh,
             Self::Stretch(_) => Kind::Internal,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
+impl Raised for CloudError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::WrongLength { .. }
+            | Self::NotFinite { .. }
+            | Self::Source { .. }
+            | Self::NoNeighbours
+            | Self::TooLarge { .. }
+            | Self::Disconnected(_) => Kind::Argument,
             Self::Cancelled(error) => error.kind(),
         }
     }

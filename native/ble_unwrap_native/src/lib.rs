@@ -22,7 +22,7 @@ mod native {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use crate::distances::geodesic_distances;
+    use crate::distances::{geodesic_distances, graph_distances};
     #[pymodule_export]
     use crate::embed::{Embedding, embed};
     #[pymodule_export]

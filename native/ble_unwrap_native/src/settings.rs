@@ -46,6 +46,7 @@ pub(crate) enum Function {
     Embed,
     Flatten,
     GeodesicDistances,
+    GraphDistances,
     Measure,
     Pack,
 }
@@ -57,6 +58,7 @@ impl Function {
             Self::Embed => "embed",
             Self::Flatten => "flatten",
             Self::GeodesicDistances => "geodesic_distances",
+            Self::GraphDistances => "graph_distances",
             Self::Measure => "measure",
             Self::Pack => "pack",
         }
@@ -132,8 +134,14 @@ const EMBED: &[Function] = &[Function::Embed, Function::Flatten];
 const GEODESICS: &[Function] = &[Function::GeodesicDistances, Function::Flatten];
 const PACK: &[Function] = &[Function::Pack];
 const TEXTURE: &[Function] = &[Function::Measure, Function::Pack];
-const ALL: &[Function] =
-    &[Function::Embed, Function::Flatten, Function::GeodesicDistances, Function::Measure, Function::Pack];
+const ALL: &[Function] = &[
+    Function::Embed,
+    Function::Flatten,
+    Function::GeodesicDistances,
+    Function::GraphDistances,
+    Function::Measure,
+    Function::Pack,
+];
 
 #[rustfmt::skip] // a table: one row a setting
 const TABLE: &[Setting] = &[
@@ -288,6 +296,12 @@ pub(crate) fn flag(name: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
 fn real(name: &str, value: &Bound<'_, PyAny>, interval: Interval, or: &str) -> PyResult<f64> {
     let found = value.extract().ok().filter(|&x: &f64| interval.contains(x));
     found.ok_or_else(|| refusal(name, &format!("{}{or}", interval.text()), value))
+}
+
+/// A finite number above 0; `or` ends its description.
+pub(crate) fn positive(name: &str, value: &Bound<'_, PyAny>, or: &str) -> PyResult<f64> {
+    let found = value.extract().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
+    found.ok_or_else(|| refusal(name, &format!("a number above 0{or}"), value))
 }
 
 /// A whole number within a range; `unit` ends the description of the range.

@@ -3,6 +3,7 @@
 use ble_unwrap_core::embedding::{Initial, Model, Update};
 use ble_unwrap_core::geodesics::Metric;
 use ble_unwrap_core::packing::Rotation;
+use ble_unwrap_core::standalone::Connect;
 use ble_unwrap_core::stretch::Solver;
 use ble_unwrap_core::{ChartScale, Holes};
 
@@ -47,6 +48,7 @@ words!(DataKind { "points" => Points, "distances" => Distances, "affinities" => 
 words!(Preset { "default" => Default, "paper" => Paper, "iso_charts" => IsoCharts });
 words!(Holes { "keep" => Keep, "cut" => Cut });
 words!(ChartScale { "uniform" => Uniform, "stretch" => Stretch });
+words!(Connect { "error" => Error, "bridge" => Bridge, "separate" => Separate });
 words!(Metric { "fast_marching" => FastMarching, "dijkstra" => Dijkstra });
 words!(Model { "default" => Default, "paper" => Paper, "isomap" => Isomap });
 words!(Update { "serial" => Serial, "parallel" => Parallel });

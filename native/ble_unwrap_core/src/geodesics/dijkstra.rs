@@ -132,7 +132,7 @@ fn offer(distance: &mut [f64], heap: &mut MinHeap, v: usize, d: f64, radius: f64
 
 /// Distances along the edges of a graph from each of `sources` to every node, as rows of length n one
 /// after another: the geodesic distances of a point cloud whose graph [`knn_graph`](super::knn_graph())
-/// made (paper, equation 12). Infinite between components; sources run in parallel, with the same
+/// made (paper, section 5.1). Infinite between components; sources run in parallel, with the same
 /// result for any number of threads. The row of a source that is no node is infinite.
 ///
 /// # Errors

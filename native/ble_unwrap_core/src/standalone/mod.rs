@@ -4,10 +4,12 @@
 
 mod distances;
 mod flatten;
+mod graph;
 mod layout;
 mod repack;
 
 pub use distances::{DistancesError, surface_distances};
 pub use flatten::{FlattenError, FlattenReport, Flattening, MapQuality, flatten};
+pub use graph::{CloudError, CloudSettings, Connect, cloud_distances};
 pub use layout::{LayoutError, LayoutMeasures, measure_layout};
 pub use repack::{RepackError, Repacked, repack};

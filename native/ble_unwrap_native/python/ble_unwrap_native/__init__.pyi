@@ -22,6 +22,7 @@ __all__ = [
     "embed",
     "flatten",
     "geodesic_distances",
+    "graph_distances",
     "measure",
     "pack",
     "submit_unwrap",
@@ -186,6 +187,16 @@ def geodesic_distances(
     corner_triangles: Buffer | None = None,
     job: Job | None = None,
     **settings: Unpack[_GeodesicSettings],
+) -> Array: ...
+def graph_distances(
+    points: Buffer,
+    sources: Buffer | None = None,
+    *,
+    neighbours: int = 12,
+    connect: Literal["error", "bridge", "separate"] = "error",
+    radius: float | None = None,
+    job: Job | None = None,
+    **settings: Unpack[_Threads],
 ) -> Array: ...
 def measure(
     positions: Buffer,
