@@ -112,7 +112,7 @@ def atlases(models, renders):
 
 
 def variants(models):
-    """The models by the three presets: charts and stretch of whole atlases."""
+    """Models by the three presets: charts and stretch of whole atlases."""
     rows = []
     for mesh in models:
         for preset in ("default", "paper", "iso_charts"):
@@ -159,7 +159,7 @@ def main():
     patches = compare.compare_patches(shapes.patches())
     say("the table: three methods on the same charts")
     charts = {mesh.name: compare.compare_charts(mesh) for mesh in models}
-    presets = [] if options.quick else variants(models)
+    presets = [] if options.quick else variants(models if options.models else shapes.complex_models(0.085))
     say("time against size")
     sizes = measure.SIZES[:3] if options.quick else measure.SIZES
     surfaces, points = measure.time_of_surfaces(sizes), measure.time_of_points(sizes)

@@ -341,5 +341,6 @@ def goblin(cell=0.042):
     return surface_net("goblin", distance, (-1.25, -1.0, -1.25), (1.25, 0.9, 1.1), cell, view=(0.5, -1.0, 0.18))
 
 
-def complex_models():
-    return [skull(), goblin(), cat()]
+def complex_models(cell=None):
+    """Of some 6,000 faces each, or in cells of a given size."""
+    return [make(cell) if cell else make() for make in (skull, goblin, cat)]

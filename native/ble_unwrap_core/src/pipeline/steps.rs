@@ -4,7 +4,7 @@
 use nalgebra::Point2;
 
 use crate::distortion::RestTriangle;
-use crate::embedding::{self, ChartEmbedding, EmbeddingError};
+use crate::embedding::{self, ChartEmbedding, EmbeddingError, Model};
 use crate::geodesics::{self, LandmarkDistances};
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
@@ -25,6 +25,10 @@ pub(crate) struct Steps<'a> {
 impl<'a> Steps<'a> {
     pub(crate) fn new(mesh: &'a TriMesh, settings: &'a Settings, seed: u64, progress: &'a Progress) -> Self {
         Self { mesh, rest: RestTriangle::of_mesh(mesh), settings, seed, progress }
+    }
+
+    pub(crate) fn model(&self) -> Model {
+        self.settings.embedding.model
     }
 
     /// Distances between all vertices, if the settings have so small a patch embedded as a whole: the
