@@ -3,8 +3,8 @@
 python blender_scripts/paper_render.py JOBS.json
 
 JOBS.json is a list of {"mesh": FILE.npz, "picture": FILE.png, "view": [x, y, z], "size": [w, h], "samples": n,
-"cells": checker fields a unit of the UVs}. The mesh holds positions (n, 3), corner_vertices (c,) and face_offsets (f + 1,);
-uv (c, 2), if there, is shown as a checker; colours (f, 3), if there, tint the faces.
+"cells": checker fields a unit of the UVs}. The mesh holds positions (n, 3), corner_vertices (c,) and face_offsets
+(f + 1,); uv (c, 2), if there, is shown as a checker; colours (f, 3), if there, tint the faces.
 """
 
 import json

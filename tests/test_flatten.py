@@ -182,7 +182,7 @@ def line():
 @pytest.mark.parametrize(
     ("mesh", "text"),
     [
-        (apart, "comes in 2 pieces, one with face 0 and another with face 4; flatten them one at a time, or use unwrap"),
+        (apart, "2 pieces, one with face 0 and another with face 4; flatten them one at a time, or use unwrap"),
         (lambda: conftest.sphere(12, 8), "the surface is closed; .* or use unwrap"),
         (tube_with_a_handle, "has 1 handles; cut them open, or use unwrap"),
         (not_finite, "face 0 has a vertex with non-finite coordinates"),

@@ -52,7 +52,8 @@ def face_stretch(positions, triangles, uv):
 def trimmed_l2(mesh, uv, trimmed=TRIMMED):
     """L2 stretch of all but the hundredth of the surface that is stretched most.
 
-    Where a map folds, a few triangles are squeezed to almost nothing and alone decide its L2 stretch; this tells the rest.
+    Where a map folds, a few triangles are squeezed to almost nothing and alone decide its L2 stretch; this tells of the
+    rest.
     """
     squared, surface, plane = face_stretch(mesh.positions, mesh.triangles(), uv)
     order = np.argsort(squared, kind="stable")
@@ -126,8 +127,8 @@ def patch_table(rows):
         lines.append(
             f"| {patch} | {row.method} | {report['flips_before']} | {number(report['l2_before'])} |"
             f" {number(row.trimmed_before)} | {report['distance_correlation_before']:.4f} | {report['sweeps'] or '-'} |"
-            f" {milliseconds(report['seconds']['embedding'])} | {report['flips_after']} | {number(report['l2_after'])} |"
-            f" {report['distance_correlation_after']:.4f} |"
+            f" {milliseconds(report['seconds']['embedding'])} | {report['flips_after']} |"
+            f" {number(report['l2_after'])} | {report['distance_correlation_after']:.4f} |"
         )
     return "\n".join(lines)
 
@@ -135,8 +136,8 @@ def patch_table(rows):
 def chart_table(groups):
     """Rows of the charts of each model, added up: {model: rows}."""
     lines = [
-        "| charts of | method | flips | without flips | L2 of 99 % | correlation | sweeps | embedding, ms | flips after |"
-        " L2 after |",
+        "| charts of | method | flips | without flips | L2 of 99 % | correlation | sweeps | embedding, ms |"
+        " flips after | L2 after |",
         "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|",
     ]
     for model, rows in groups.items():
@@ -165,4 +166,3 @@ def advantage(rows, patch):
     """How much less stretch above 1 the default model has than Isomap on a patch, before any minimisation: 0 to 1."""
     l2 = {row.method: row.report["l2_before"] for row in rows if row.patch == patch}
     return 1 - (l2["BLE (default)"] - 1) / (l2["Isomap"] - 1)
-

@@ -51,37 +51,25 @@ def camera(view):
 
 
 def draw_surface(axes, mesh):
-    """The mesh in space, lit from the upper left, hidden faces behind others."""
+    """The mesh in space with the edges of its polygons, lit from the upper left; nearer faces are drawn over others."""
     right, up, backward = camera(mesh.view)
-    triangles = mesh.triangles()
-    corners = mesh.positions[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-30)[:, None]
-    normal *= np.sign(normal @ backward)[:, None]
     light = -0.45 * right + 0.6 * up + 0.66 * backward
-    shade = DARKEST + (1 - DARKEST) * np.clip(normal @ light, 0, 1)
-    tint = np.array(matplotlib.colors.to_rgb(FACE))
-    order = np.argsort(corners.mean(axis=1) @ backward)
-    flat = np.stack([corners @ right, corners @ up], axis=-1)
-    colours = np.clip(shade[:, None] * tint * 1.12, 0, 1)
-    axes.add_collection(PolyCollection(flat[order], facecolors=colours[order], edgecolors=colours[order], linewidths=0.4))
-    # Edges of the polygons only, drawn with the faces so that hidden ones stay hidden: again in order.
-    if len(triangles) < 5_000:
-        polygons = mesh.polygons()
-        middle = np.array([mesh.positions[p].mean(axis=0) @ backward for p in polygons])
-        place = np.stack([mesh.positions @ right, mesh.positions @ up], axis=1)
-        shape = [place[polygons[f]] for f in np.argsort(middle)]
-        shading = [shade_of(mesh.positions[polygons[f]], light, backward, tint) for f in np.argsort(middle)]
-        axes.collections[-1].remove()
-        axes.add_collection(PolyCollection(shape, facecolors=shading, edgecolors=EDGE, linewidths=0.25))
-    frame(axes, flat.reshape(-1, 2))
+    polygons = mesh.polygons()
+    polygons = [polygons[f] for f in np.argsort([mesh.positions[p].mean(axis=0) @ backward for p in polygons])]
+    place = np.stack([mesh.positions @ right, mesh.positions @ up], axis=1)
+    colours = [_shade(mesh.positions[p], light, backward) for p in polygons]
+    shape = [place[p] for p in polygons]
+    axes.add_collection(PolyCollection(shape, facecolors=colours, edgecolors=EDGE, linewidths=0.25))
+    frame(axes, place)
 
 
-def shade_of(points, light, backward, tint):
+def _shade(points, light, backward):
+    """The colour of a polygon; both of its sides are lit."""
     normal = sum(np.cross(points[k], points[(k + 1) % len(points)]) for k in range(len(points)))
     normal = normal / max(np.linalg.norm(normal), 1e-30)
     normal = normal * (np.sign(normal @ backward) or 1.0)
-    return np.clip((DARKEST + (1 - DARKEST) * max(normal @ light, 0)) * tint * 1.15, 0, 1)
+    shade = DARKEST + (1 - DARKEST) * max(normal @ light, 0)
+    return np.clip(1.15 * shade * np.array(matplotlib.colors.to_rgb(FACE)), 0, 1)
 
 
 def frame(axes, points, half=None):
@@ -218,7 +206,8 @@ def figure_3(models, path):
         axes.set_xticks([])
         axes.set_yticks([])
         axes.set_title(f"texture used: {100 * report['packing_efficiency']:.0f} %")
-    figure.subplots_adjust(left=0.01, right=0.985, bottom=0.012, top=1 - 0.3 / (3.2 * len(models)), wspace=0.05, hspace=0.12)
+    top = 1 - 0.3 / (3.2 * len(models))
+    figure.subplots_adjust(left=0.01, right=0.985, bottom=0.012, top=top, wspace=0.05, hspace=0.12)
     save(figure, path)
 
 

@@ -2,10 +2,12 @@
 
 python native/paper/make.py [MODEL.obj ...] [-o out/paper] [--no-render] [--quick]
 
-Writes tables (Markdown and JSON) and pictures to the output directory, and refreshes the page and the pictures beside this
-file. Models given by path take the place of the generated ones in figure 3 and add their charts to the table; then the page
+Writes tables (Markdown and JSON) and pictures to the output directory, and refreshes the page and the pictures beside
+this file. Models given by path take the place of the generated ones in figure 3 and in the table of charts; then the page
 here is left alone. Needs the wheel, matplotlib and scikit-learn, and for the renders a Blender or its Python package.
 """
+
+# ruff: noqa: E402
 
 import argparse
 import json
@@ -45,7 +47,7 @@ class Renders:
         self.directory, self.wanted, self.jobs = directory, wanted, []
         directory.mkdir(parents=True, exist_ok=True)
 
-    def add(self, name, mesh, uv=None, colours=None, *, cells=1.0, size=(400, 380), samples=24):
+    def add(self, name, mesh, uv=None, colours=None, *, cells=1.0, size=(400, 400), samples=24):
         data = {
             "positions": mesh.positions,
             "corner_vertices": mesh.corner_vertices,
@@ -167,10 +169,20 @@ def main():
     say("trustworthiness")
     trust = measure.trustworthiness_table(400 if options.quick else 1500)
     text = page.text(
-        machine=machine(), faces=faces, heads=heads, made=made, patches=patches, charts=charts, presets=presets,
-        surfaces=surfaces, points=points, trust=trust, rendered=(pictures / "figure_3.png").is_file(),
+        machine=machine(),
         models=[Path(path).name for path in options.models],
-    )  # fmt: skip
+        rendered=(pictures / "figure_3.png").is_file(),
+        faces=faces,
+        landmarks=ble.flatten(*face.arrays).report,
+        heads=heads,
+        made=made,
+        patches=patches,
+        charts=charts,
+        presets=presets,
+        surfaces=surfaces,
+        points=points,
+        trust=trust,
+    )
     (out / "README.md").write_text(text, encoding="utf-8")
     rows = [
         {"patch": row.patch, "method": row.method, "l2_of_99_before": row.trimmed_before, **row.report}

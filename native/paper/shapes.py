@@ -1,10 +1,10 @@
 """The surfaces of the paper's figures, generated, and meshes read from OBJ files.
 
-Their models (a face, a skull, a goblin, a cat, the camel's head) are not public or not ours to hand on, so there are look-alikes
-here: of the same kind and size, with the same difficulties. Every mesh is a `Mesh` of polygons as corner lists.
+Their models (a face, a skull, a goblin, a cat, the camel's head) are not public or not ours to hand on, so there are
+look-alikes here: of the same kind and size, with the same difficulties. Every mesh is a `Mesh` of polygons as corner lists.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,6 @@ class Mesh:
     corner_vertices: np.ndarray
     face_offsets: np.ndarray
     view: tuple = (0.62, -1.0, 0.42)  # where the camera stands, seen from the model
-    notes: str = field(default="")
 
     @property
     def arrays(self):
@@ -49,7 +48,8 @@ class Mesh:
         chosen = [polygons[f] for f in faces]
         used, corners = np.unique(np.concatenate(chosen), return_inverse=True)
         offsets = np.concatenate([[0], np.cumsum([len(p) for p in chosen])])
-        return Mesh(name, self.positions[used], corners.reshape(-1).astype(np.int32), offsets.astype(np.int32), self.view)
+        corners, offsets = corners.reshape(-1).astype(np.int32), offsets.astype(np.int32)
+        return Mesh(name, self.positions[used], corners, offsets, self.view)
 
 
 def of_polygons(name, positions, polygons, **more):
@@ -95,9 +95,7 @@ def _disc(rings):
         for sector in range(6):
             for k in range(ring):
                 outer = [start[ring] + (sector * ring + k + d) % (6 * ring) for d in (0, 1)]
-                inner = [
-                    start[ring - 1] + (sector * (ring - 1) + k + d) % max(6 * (ring - 1), 1) for d in (0, 1)
-                ]
+                inner = [start[ring - 1] + (sector * (ring - 1) + k + d) % max(6 * (ring - 1), 1) for d in (0, 1)]
                 triangles.append([outer[0], outer[1], inner[0]])
                 if k < ring - 1:
                     triangles.append([inner[0], outer[1], inner[1]])
@@ -194,7 +192,7 @@ def largest_piece(mesh, name):
     return mesh.part(of_face == names[count.argmax()], name)
 
 
-# Complex models: closed surfaces out of a distance field ---------------------------------------------------------------
+# Complex models: closed surfaces out of a distance field -------------------------------------------------------------
 
 
 def surface_net(name, distance, low, high, cell, **more):
@@ -243,7 +241,8 @@ def _surface_net(name, distance, low, high, cell, **more):
         change = inside[a] != inside[b]
         second, third = (axis + 1) % 3, (axis + 2) % 3
         at = np.stack(np.nonzero(change), axis=1)
-        at = at[(at[:, second] > 0) & (at[:, third] > 0) & (at[:, second] < cells[second]) & (at[:, third] < cells[third])]
+        at = at[(at[:, [second, third]] > 0).all(axis=1)]
+        at = at[(at[:, second] < cells[second]) & (at[:, third] < cells[third])]
         around = [(0, 0), (1, 0), (1, 1), (0, 1)]
         corner = []
         for s, t in around:
