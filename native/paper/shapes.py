@@ -1,7 +1,8 @@
 """The surfaces of the paper's figures, generated, and meshes read from OBJ files.
 
 Their models (a face, a skull, a goblin, a cat, the camel's head) are not public or not ours to hand on, so there are
-look-alikes here: of the same kind and size, with the same difficulties. Every mesh is a `Mesh` of polygons as corner lists.
+look-alikes here: of the same kind and size, with the same difficulties. Every mesh is a `Mesh` of polygons as corner
+lists.
 """
 
 from dataclasses import dataclass
