@@ -4,7 +4,8 @@ python native/paper/make.py [MODEL.obj ...] [-o out/paper] [--no-render] [--quic
 
 Writes tables (Markdown and JSON) and pictures to the output directory, and refreshes the page and the pictures beside
 this file. Models given by path take the place of the generated ones in figure 3 and in the table of charts; then the
-page here is left alone. Needs the wheel, matplotlib and scikit-learn, and for the renders a Blender or its Python package.
+page here is left alone. Needs the wheel, matplotlib and scikit-learn, and for the renders a Blender or its Python
+package.
 """
 
 # ruff: noqa: E402

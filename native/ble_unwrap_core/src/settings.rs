@@ -8,9 +8,12 @@ use crate::segmentation::SegmentationSettings;
 use crate::stretch::StretchSettings;
 
 /// Patches of more vertices are embedded by landmarks in the presets of the paper, too. All distances of m vertices
-/// take 32 m² bytes in all and 3 µs a pair (distances, sweeps): 130 MB and 12 s at 2,000, which the paper's own
-/// patches of "around 1,000 vertices" leave room for; every patch tried costs that again.
+/// take some 20 m² bytes and 0.4 µs a pair (marching, sweeps): 80 MB and 1.5 s at 2,000, twice the paper's own face of
+/// "around 1,000 vertices"; every patch that is tried costs that again.
 const PAPER_TOGETHER_MAX: usize = 2_000;
+
+/// Most vertices of a patch whose distances to each other can be handled: 8 GB and minutes.
+pub(crate) const MOST_TOGETHER: usize = 20_000;
 
 /// What happens to the holes of a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,7 +129,7 @@ impl Settings {
         let t = &self.stretch;
         let positive = "a positive number";
         let unit = "between 0 and 1";
-        let checks: [(&'static str, f64, bool, &'static str); 14] = [
+        let checks: [(&'static str, f64, bool, &'static str); 15] = [
             (
                 "stretch_limit",
                 self.stretch_limit,
@@ -141,6 +144,7 @@ impl Settings {
             ),
             ("landmark_min", g.landmark_min as f64, g.landmark_min >= 3, "at least 3"),
             ("landmark_max", g.landmark_max as f64, g.landmark_max >= g.landmark_min, "at least landmark_min"),
+            ("together_max", self.together_max as f64, self.together_max <= MOST_TOGETHER, "at most 20,000"),
             ("first_parts", s.first_parts as f64, s.first_parts >= 2, "at least 2"),
             ("later_parts", s.later_parts as f64, s.later_parts >= 2, "at least 2"),
             ("band", s.band, (0.0..=1.0).contains(&s.band), unit),
@@ -168,5 +172,23 @@ impl Settings {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_are_valid_and_iso_charts_differs_from_the_paper_in_its_model_only() {
+        for settings in [Settings::default(), Settings::paper(), Settings::iso_charts()] {
+            assert!(settings.validate().is_ok());
+        }
+        let mut settings = Settings::iso_charts();
+        assert_eq!(settings.embedding.model, Model::Isomap);
+        settings.embedding.model = Model::Paper;
+        assert_eq!(settings, Settings::paper());
+        let too_many = Settings { together_max: MOST_TOGETHER + 1, ..Settings::default() };
+        assert!(matches!(too_many.validate(), Err(UnwrapError::Setting { name: "together_max", .. })));
     }
 }

@@ -11,11 +11,9 @@ use crate::geodesics::{self, LandmarkDistances};
 use crate::mesh::{self, ConditionOptions, MeshError, MeshInput, Surface, VertexId};
 use crate::pipeline::{Clock, Steps};
 use crate::progress::{Cancelled, Progress, Stage};
-use crate::settings::Settings;
+use crate::settings::{MOST_TOGETHER, Settings};
 use crate::stretch::{self, StretchError};
 
-/// Most landmarks: the distances between them alone take 3 GB then, and an embedding many minutes.
-const MOST_LANDMARKS: usize = 20_000;
 /// Height, where the surface has area 1, up to which a face's lengths are rounding; such a face does not count.
 const NEGLIGIBLE: f64 = 1e-8;
 
@@ -79,7 +77,7 @@ pub enum FlattenError {
     },
     /// Too many pairs.
     #[error(
-        "{landmarks} landmarks are more than the {MOST_LANDMARKS} whose distances can be handled; lower landmark_fraction or landmark_max"
+        "{landmarks} landmarks are more than the {MOST_TOGETHER} whose distances can be handled; lower landmark_fraction or landmark_max"
     )]
     TooManyLandmarks {
         /// As many as the settings ask for.
@@ -299,7 +297,7 @@ fn distances(steps: &Steps<'_>, settings: &Settings, progress: &Progress) -> Res
     let n = mesh.vertex_count();
     let all = asked.landmark_fraction >= 1.0 || n <= settings.together_max;
     let landmarks = if all { n } else { asked.landmark_count(n) };
-    if landmarks > MOST_LANDMARKS {
+    if landmarks > MOST_TOGETHER {
         return Err(FlattenError::TooManyLandmarks { landmarks });
     }
     if all {
