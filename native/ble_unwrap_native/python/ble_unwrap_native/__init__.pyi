@@ -11,6 +11,7 @@ __all__ = [
     "BleUnwrapError",
     "Cancelled",
     "Embedding",
+    "Flattening",
     "InternalError",
     "InvalidArgumentError",
     "InvalidMeshError",
@@ -20,6 +21,7 @@ __all__ = [
     "__version__",
     "default_settings",
     "embed",
+    "flatten",
     "geodesic_distances",
     "graph_distances",
     "measure",
@@ -40,7 +42,7 @@ class InternalError(BleUnwrapError): ...
 
 @type_check_only
 class _Threads(TypedDict, total=False):
-    preset: Literal["default", "paper"]
+    preset: Literal["default", "paper", "iso_charts"]
     threads: int
 
 @type_check_only
@@ -76,18 +78,22 @@ class _CloudSettings(_EmbeddingSettings, _PackSettings, total=False):
     landmark_max: int | None
 
 @type_check_only
-class _Settings(_GeodesicSettings, _EmbeddingSettings, _PackSettings, total=False):
-    stretch_limit: float
+class _FlattenSettings(_GeodesicSettings, _EmbeddingSettings, total=False):
     weld: bool
+    landmark_fraction: float
+    landmark_min: int
+    landmark_max: int | None
+    together_max: int
+    stretch_solver: Literal["newton", "line_search"]
+    stretch_iterations: int
+
+@type_check_only
+class _Settings(_FlattenSettings, _PackSettings, total=False):
+    stretch_limit: float
     coarse: bool
     merge: bool
     holes: Literal["keep", "cut"]
     chart_scale: Literal["uniform", "stretch"]
-    landmark_fraction: float
-    landmark_min: int
-    landmark_max: int | None
-    stretch_solver: Literal["newton", "line_search"]
-    stretch_iterations: int
 
 @final
 class Array(Buffer):
@@ -114,6 +120,15 @@ class Embedding:
     def coordinates(self) -> Array: ...
     @property
     def intercepts(self) -> Array: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
+
+@final
+class Flattening:
+    @property
+    def embedded(self) -> Array: ...
+    @property
+    def uv(self) -> Array: ...
     @property
     def report(self) -> dict[str, Any]: ...
 
@@ -187,6 +202,16 @@ def embed(
     job: Job | None = None,
     **settings: Unpack[_EmbeddingSettings],
 ) -> Embedding: ...
+def flatten(
+    positions: Buffer,
+    corner_vertices: Buffer,
+    face_offsets: Buffer,
+    *,
+    corner_triangles: Buffer | None = None,
+    minimise: bool = True,
+    job: Job | None = None,
+    **settings: Unpack[_FlattenSettings],
+) -> Flattening: ...
 def geodesic_distances(
     positions: Buffer,
     corner_vertices: Buffer,
@@ -226,4 +251,4 @@ def pack(
     job: Job | None = None,
     **settings: Unpack[_PackSettings],
 ) -> PackedCharts: ...
-def default_settings(preset: Literal["default", "paper"] = "default") -> dict[str, Any]: ...
+def default_settings(preset: Literal["default", "paper", "iso_charts"] = "default") -> dict[str, Any]: ...
