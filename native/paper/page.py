@@ -28,7 +28,7 @@ def _head(machine, models):
 
 *Bernoulli Embedding Model and Its Application in Texture Mapping* (2006) shows two figures and compares itself with Isomap and
 iso-charts in words. `make paper` makes the figures and the comparison anew and writes this page (`make paper MODELS="a.obj b.obj"`
-does it for your own models, to `out/paper/`).{given} Measured on {machine}; seconds vary with the machine and what else it does,
+does it for your own models, to `out/paper/`).{given} Measured on {machine}; seconds vary with the machine and what else it does (of embeddings of patches the best of several runs is given),
 everything else is the same on any machine.
 
 Three methods are compared, on the same surfaces and the same geodesic distances:
@@ -54,7 +54,7 @@ All {default["vertices"]:,} vertices are embedded together. The paper reports 10
 printed model takes {printed["sweeps"]} sweeps from a random start ({compare.milliseconds(printed["seconds"]["embedding"])} ms with everything),
 the default model {default["sweeps"]} from classical scaling ({compare.milliseconds(default["seconds"]["embedding"])} ms, the scaling included). By
 {landmarks["landmarks"]} landmarks, as `unwrap` does it, the default model takes {compare.milliseconds(landmarks["seconds"]["embedding"])} ms. The printed model turns {printed["flips_before"]} of {printed["triangles"]:,} triangles over (magenta), most at the
-rim; the paper speaks of "few flipped triangles" for that reason and adjusts them afterwards. The default model turns over {default["flips_before"]}."""
+rim; the paper expects "few flipped triangles", since connectivity is not used, and adjusts them afterwards. The default model turns over {default["flips_before"]}."""
 
 
 def _figure_2b(rows):
@@ -202,7 +202,7 @@ def _limits():
 
 - **The printed model folds even a flat sheet.** Fitting log-odds x·x' to a Gaussian of distance misses the terms -|x|²/2 and -|x'|²/2. It is the
   optimum of the model, not a bad start: random starts and the true solution end at the same likelihood. The 3:1 rectangle and the L above, which are
-  flat, are turned over by half. No kernel width tried mends it. Nothing in the paper's figures contradicts this: flips are mentioned, and shown, and
+  flat, are turned over by half; other kernel widths make it worse, not better (an evenly meshed disc is the one flat shape found that it keeps). Nothing in the paper's figures contradicts this: flips are mentioned, and shown, and
   then removed by stretch minimisation.
 - **Misprints.** Equation (10) is x - ωB⁻¹∇F; figure 1 maximises; after (6), K = ∇²F - B; convergence is linear, not of second order; σ is a squared length.
   The code follows what must have been meant.
