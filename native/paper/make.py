@@ -161,6 +161,8 @@ def main():
         figures.figure_3(made, pictures / "figure_3.png")
     say("the table: three methods on the same patches")
     patches = compare.compare_patches(shapes.patches(), runs=RUNS)
+    two = {name: compare.CHART_METHODS[name] for name in ("BLE (default)", "Isomap")}
+    by_landmarks = compare.compare_patches(shapes.patches()[:-1], two)
     say("the table: three methods on the same charts")
     charts = {mesh.name: compare.compare_charts(mesh) for mesh in models}
     presets = [] if options.quick else variants(models if options.models else shapes.complex_models(0.085))
@@ -179,6 +181,7 @@ def main():
         heads=heads,
         made=made,
         patches=patches,
+        by_landmarks=by_landmarks,
         charts=charts,
         presets=presets,
         surfaces=surfaces,
