@@ -103,24 +103,24 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         default=False,
     )
     use_selection: BoolProperty(
-        name="Only Selected Faces",
-        description="In Edit Mode, unwrap the selected faces and leave the others as they are",
+        name="Only Selected",
+        description="In Edit Mode, unwrap the selected faces, or points of a cloud, and leave the others as they are",
         default=True,
     )
 
     # ---- where the result goes
     uv_map: EnumProperty(
         name="UV Map",
-        description="Which UV map is written",
+        description="Which UV map is written; of a point cloud, which attribute of two numbers a point",
         items=(
-            ("ACTIVE", "Active", "Replace the active UV map; one is made where there is none"),
+            ("ACTIVE", "Active", "Replace the active UV map, of points the one of this name; made where there is none"),
             ("NEW", "New", "Add a UV map and make it the active one"),
         ),
         default="ACTIVE",
     )
     uv_map_name: StringProperty(
         name="Name",
-        description="Name of UV maps that are made",
+        description="Name of UV maps that are made and of a cloud's attribute; if other data has it, the next free one",
         default="UVMap",
         maxlen=60,
     )
@@ -142,7 +142,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         default=False,
     )
     coarse: BoolProperty(
-        name="Coarse Mesh",
+        name="Coarse First",
         description="Decide on a coarse copy where to cut large pieces of surface, which is many times faster",
         default=True,
     )
@@ -174,6 +174,15 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         description="Start of all random choices; the same seed gives the same result on any machine",
         default=0,
         min=0,
+    )
+
+    neighbours: IntProperty(
+        name="Neighbours",
+        description="Nearest points that each point of a cloud is joined to; more bridge gaps, fewer keep sheets apart",
+        default=12,
+        min=4,
+        max=256,
+        soft_max=64,
     )
 
     # ---- landmarks and distances
@@ -304,12 +313,18 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
 
 # Settings that the native module never sees.
 BRIDGE_SETTINGS = ("use_seams", "use_selection", "uv_map", "uv_map_name", "use_original_bounds", "mark_seams")
+# What means something for surfaces only, or for clouds only; the other one's functions do not take it.
+SURFACE_SETTINGS = (
+    *("use_seams", "mark_seams", "weld", "merge", "holes", "chart_scale", "geodesics"),
+    *("stretch_solver", "stretch_iterations"),
+)
+CLOUD_SETTINGS = ("neighbours",)
 
 # What the panel shows at once, and what it folds away, by title.
 MAIN_SETTINGS = ("stretch_limit", "texture_size", "margin", "rotation", "use_seams", "use_selection")
 ADVANCED_SETTINGS = (
     ("Result", ("uv_map", "uv_map_name", "use_original_bounds", "mark_seams")),
-    ("Charts", ("weld", "coarse", "merge", "holes", "chart_scale", "seed")),
+    ("Charts", ("neighbours", "weld", "coarse", "merge", "holes", "chart_scale", "seed")),
     ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max")),
     ("Embedding", ("model", "kernel_width", "relaxation", "max_sweeps", "tolerance", "update", "initial")),
     ("Stretch", ("stretch_solver", "stretch_iterations")),
@@ -319,6 +334,11 @@ ADVANCED_SETTINGS = (
 def annotations():
     """The declared settings: name -> deferred property, in order of declaration."""
     return BLEUnwrapSettings.__annotations__
+
+
+def native_values(settings, left_out):
+    """Settings for a native function: those of the bridge and those that it does not take left out."""
+    return {name: value for name, value in settings.items() if name not in BRIDGE_SETTINGS and name not in left_out}
 
 
 def operator_annotations():

@@ -2,12 +2,12 @@
 
 use std::fmt::Display;
 
-use ble_unwrap_core::UnwrapError;
 use ble_unwrap_core::embedding::EmbeddingError;
 use ble_unwrap_core::mesh::MeshError;
 use ble_unwrap_core::packing::PackError;
-use ble_unwrap_core::standalone::{CloudError, DistancesError, FlattenError, LayoutError, RepackError};
+use ble_unwrap_core::standalone::{CloudDistancesError, DistancesError, FlattenError, LayoutError, RepackError};
 use ble_unwrap_core::stretch::StretchError;
+use ble_unwrap_core::{CloudError, UnwrapError};
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -144,6 +144,20 @@ impl Raised for UnwrapError {
     }
 }
 
+impl Raised for CloudError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Setting(error) => error.kind(),
+            Self::Pack(error) => error.kind(),
+            Self::Neighbours { .. }
+            | Self::NoFinitePoint { .. }
+            | Self::TooLarge { .. }
+            | Self::TooManySpecks { .. } => Kind::Argument,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
 impl Raised for EmbeddingError {
     fn kind(&self) -> Kind {
         match self {
@@ -203,7 +217,7 @@ impl Raised for FlattenError {
     }
 }
 
-impl Raised for CloudError {
+impl Raised for CloudDistancesError {
     fn kind(&self) -> Kind {
         match self {
             Self::WrongLength { .. }

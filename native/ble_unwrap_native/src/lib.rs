@@ -1,6 +1,7 @@
 //! Python bindings of BLE Unwrap: converts, calls the core, converts back. Registration alone is here.
 
 mod arrays;
+mod cloud;
 mod distances;
 mod embed;
 mod errors;
@@ -21,6 +22,8 @@ mod words;
 mod native {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use crate::cloud::{PointAtlas, submit_unwrap_points, unwrap_points};
     #[pymodule_export]
     use crate::distances::{geodesic_distances, graph_distances};
     #[pymodule_export]

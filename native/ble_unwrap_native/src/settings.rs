@@ -43,6 +43,7 @@ pub(crate) enum Preset {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Function {
     Unwrap,
+    UnwrapPoints,
     Embed,
     Flatten,
     GeodesicDistances,
@@ -55,6 +56,7 @@ impl Function {
     fn name(self) -> &'static str {
         match self {
             Self::Unwrap => "unwrap",
+            Self::UnwrapPoints => "unwrap_points",
             Self::Embed => "embed",
             Self::Flatten => "flatten",
             Self::GeodesicDistances => "geodesic_distances",
@@ -129,11 +131,13 @@ const MOST_TOGETHER: usize = 20_000;
 const MOST_TEXELS: u32 = PackSettings::LARGEST_SIZE;
 
 const UNWRAP: &[Function] = &[];
+const CLOUD: &[Function] = &[Function::UnwrapPoints];
 const FLATTEN: &[Function] = &[Function::Flatten];
-const EMBED: &[Function] = &[Function::Embed, Function::Flatten];
+const LANDMARKS: &[Function] = &[Function::Flatten, Function::UnwrapPoints];
+const EMBED: &[Function] = &[Function::Embed, Function::Flatten, Function::UnwrapPoints];
 const GEODESICS: &[Function] = &[Function::GeodesicDistances, Function::Flatten];
-const PACK: &[Function] = &[Function::Pack];
-const TEXTURE: &[Function] = &[Function::Measure, Function::Pack];
+const PACK: &[Function] = &[Function::Pack, Function::UnwrapPoints];
+const TEXTURE: &[Function] = &[Function::Measure, Function::Pack, Function::UnwrapPoints];
 const ALL: &[Function] = &[
     Function::Embed,
     Function::Flatten,
@@ -141,21 +145,22 @@ const ALL: &[Function] = &[
     Function::GraphDistances,
     Function::Measure,
     Function::Pack,
+    Function::UnwrapPoints,
 ];
 
 #[rustfmt::skip] // a table: one row a setting
 const TABLE: &[Setting] = &[
-    row("stretch_limit", Field::Real(|c| &mut c.settings.stretch_limit, Interval::above(1.0, 1e3)), UNWRAP),
+    row("stretch_limit", Field::Real(|c| &mut c.settings.stretch_limit, Interval::above(1.0, 1e3)), CLOUD),
     row("weld", Field::Flag(|c| &mut c.settings.weld), FLATTEN),
-    row("coarse", Field::Flag(|c| &mut c.settings.coarse), UNWRAP),
+    row("coarse", Field::Flag(|c| &mut c.settings.coarse), CLOUD),
     row("merge", Field::Flag(|c| &mut c.settings.merge), UNWRAP),
     row("holes", Field::Word(|c| &mut c.settings.holes), UNWRAP),
     row("chart_scale", Field::Word(|c| &mut c.settings.chart_scale), UNWRAP),
     row("seed", Field::Seed(|c| &mut c.settings.seed), EMBED),
     row("geodesics", Field::Word(|c| &mut c.settings.geodesics.metric), GEODESICS),
-    row("landmark_fraction", Field::Real(|c| &mut c.settings.geodesics.landmark_fraction, Interval::above(0.0, 1.0)), FLATTEN),
-    row("landmark_min", Field::Whole(|c| &mut c.settings.geodesics.landmark_min, [3, 100_000]), FLATTEN),
-    row("landmark_max", Field::Limit(|c| &mut c.settings.geodesics.landmark_max, [3, 100_000]), FLATTEN),
+    row("landmark_fraction", Field::Real(|c| &mut c.settings.geodesics.landmark_fraction, Interval::above(0.0, 1.0)), LANDMARKS),
+    row("landmark_min", Field::Whole(|c| &mut c.settings.geodesics.landmark_min, [3, 100_000]), LANDMARKS),
+    row("landmark_max", Field::Limit(|c| &mut c.settings.geodesics.landmark_max, [3, 100_000]), LANDMARKS),
     row("together_max", Field::Whole(|c| &mut c.settings.together_max, [0, MOST_TOGETHER]), FLATTEN),
     row("model", Field::Word(|c| &mut c.settings.embedding.model), EMBED),
     row("kernel_width", Field::OptionalReal(|c| &mut c.settings.embedding.kernel_width, Interval::above(0.0, 1e3)), EMBED),

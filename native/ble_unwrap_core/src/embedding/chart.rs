@@ -103,9 +103,9 @@ pub fn embed_chart(
     let placed = if every_vertex_is_a_landmark(distances) {
         vec![Point2::origin(); distances.vertex_count()]
     } else {
-        let model = LandmarkModel::new(&fit.coordinates, &fit.intercepts, kernel, sigma);
+        let model = LandmarkModel::new(2, &fit.coordinates, &fit.intercepts, kernel, sigma);
         let parameters = model.place_all(distances, progress)?;
-        parameters.into_iter().map(|[x, y, _]| Point2::new(unit * x, unit * y)).collect()
+        parameters.chunks_exact(3).map(|theta| Point2::new(unit * theta[0], unit * theta[1])).collect()
     };
     let at = |l: usize| Point2::new(unit * fit.coordinates[2 * l], unit * fit.coordinates[2 * l + 1]);
     Ok(ChartEmbedding {

@@ -10,6 +10,6 @@ mod repack;
 
 pub use distances::{DistancesError, surface_distances};
 pub use flatten::{FlattenError, FlattenReport, Flattening, MapQuality, flatten};
-pub use graph::{CloudError, CloudSettings, Connect, cloud_distances};
+pub use graph::{CloudDistanceSettings, CloudDistancesError, Connect, cloud_distances};
 pub use layout::{LayoutError, LayoutMeasures, measure_layout};
 pub use repack::{RepackError, Repacked, repack};

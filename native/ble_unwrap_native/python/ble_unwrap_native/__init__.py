@@ -16,6 +16,7 @@ from ._native import (
     InvalidMeshError,
     Job,
     PackedCharts,
+    PointAtlas,
     __version__,
     default_settings,
     embed,
@@ -25,7 +26,9 @@ from ._native import (
     measure,
     pack,
     submit_unwrap,
+    submit_unwrap_points,
     unwrap,
+    unwrap_points,
 )
 
 __all__ = [
@@ -40,6 +43,7 @@ __all__ = [
     "InvalidMeshError",
     "Job",
     "PackedCharts",
+    "PointAtlas",
     "__version__",
     "default_settings",
     "embed",
@@ -49,5 +53,7 @@ __all__ = [
     "measure",
     "pack",
     "submit_unwrap",
+    "submit_unwrap_points",
     "unwrap",
+    "unwrap_points",
 ]

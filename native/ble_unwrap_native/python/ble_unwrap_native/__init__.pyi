@@ -17,6 +17,7 @@ __all__ = [
     "InvalidMeshError",
     "Job",
     "PackedCharts",
+    "PointAtlas",
     "__version__",
     "default_settings",
     "embed",
@@ -26,7 +27,9 @@ __all__ = [
     "measure",
     "pack",
     "submit_unwrap",
+    "submit_unwrap_points",
     "unwrap",
+    "unwrap_points",
 ]
 
 __version__: str
@@ -65,6 +68,14 @@ class _MeasureSettings(_Threads, total=False):
 @type_check_only
 class _PackSettings(_MeasureSettings, total=False):
     rotation: Literal["any", "quarter", "none"]
+
+@type_check_only
+class _CloudSettings(_EmbeddingSettings, _PackSettings, total=False):
+    stretch_limit: float
+    coarse: bool
+    landmark_fraction: float
+    landmark_min: int
+    landmark_max: int | None
 
 @type_check_only
 class _FlattenSettings(_GeodesicSettings, _EmbeddingSettings, total=False):
@@ -129,6 +140,15 @@ class PackedCharts:
     def report(self) -> dict[str, Any]: ...
 
 @final
+class PointAtlas:
+    @property
+    def uv(self) -> Array: ...
+    @property
+    def chart(self) -> Array: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
+
+@final
 class Job:
     def __new__(cls) -> Job: ...
     def progress(self) -> float: ...
@@ -137,7 +157,7 @@ class Job:
     def is_cancelled(self) -> bool: ...
     def is_finished(self) -> bool: ...
     def wait(self, timeout: float | None = None) -> bool: ...
-    # An `Atlas` after `submit_unwrap`, else what the call that was given the job returned.
+    # An `Atlas` after `submit_unwrap`, a `PointAtlas` after `submit_unwrap_points`, else what the call that was given the job returned.
     def result(self) -> Any: ...
 
 def unwrap(
@@ -159,6 +179,20 @@ def submit_unwrap(
     seams: Buffer | None = None,
     job: Job | None = None,
     **settings: Unpack[_Settings],
+) -> Job: ...
+def unwrap_points(
+    positions: Buffer,
+    *,
+    neighbours: int = 12,
+    job: Job | None = None,
+    **settings: Unpack[_CloudSettings],
+) -> PointAtlas: ...
+def submit_unwrap_points(
+    positions: Buffer,
+    *,
+    neighbours: int = 12,
+    job: Job | None = None,
+    **settings: Unpack[_CloudSettings],
 ) -> Job: ...
 def embed(
     data: Buffer,
