@@ -227,8 +227,8 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     together_max: IntProperty(
         name="Together",
         description=(
-            "Charts of at most so many vertices are embedded with all their vertices together, as in the paper, at a cost "
-            "of the square of their number; larger ones by their landmarks"
+            "Charts of at most so many vertices are embedded with all their vertices together, as in the paper, at a "
+            "cost of the square of their number; larger ones by their landmarks"
         ),
         default=0,
         min=0,
