@@ -18,6 +18,7 @@ PAPER_VALUES = {
     "geodesics": "FAST_MARCHING",
     "landmark_min": 3,
     "landmark_max": 0,
+    "together_max": 2000,
     "holes": "CUT",
     "coarse": False,
     "stretch_solver": "LINE_SEARCH",
@@ -26,6 +27,8 @@ PAPER_VALUES = {
     "texture_size": (1024, 1024),
     "rotation": "QUARTER",
 }
+# Preset -> what it differs in from the defaults.
+PRESET_VALUES = {"PAPER": PAPER_VALUES, "ISO_CHARTS": PAPER_VALUES | {"model": "ISOMAP"}}
 
 
 def _apply_preset(settings, _context):
@@ -33,9 +36,8 @@ def _apply_preset(settings, _context):
     for name in annotations():
         if name not in BRIDGE_SETTINGS and name != "preset":
             settings.property_unset(name)
-    if settings.preset == "PAPER":
-        for name, value in PAPER_VALUES.items():
-            setattr(settings, name, value)
+    for name, value in PRESET_VALUES.get(settings.preset, {}).items():
+        setattr(settings, name, value)
 
 
 class BLEUnwrapSettings(bpy.types.PropertyGroup):
@@ -47,6 +49,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         items=(
             ("DEFAULT", "Default", "Extended model, fast solvers: least stretch and fewest charts"),
             ("PAPER", "Paper", "The published method as printed: slower, more charts"),
+            ("ISO_CHARTS", "Iso-charts", "The same with Isomap, the method the paper compares itself with"),
         ),
         default="DEFAULT",
         update=_apply_preset,
@@ -221,6 +224,17 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         max=100_000,
         soft_max=2000,
     )
+    together_max: IntProperty(
+        name="Together",
+        description=(
+            "Charts of at most so many vertices are embedded with all their vertices together, as in the paper, at a "
+            "cost of the square of their number; larger ones by their landmarks"
+        ),
+        default=0,
+        min=0,
+        max=20_000,
+        soft_max=2000,
+    )
 
     # ---- embedding
     model: EnumProperty(
@@ -316,7 +330,7 @@ BRIDGE_SETTINGS = ("use_seams", "use_selection", "uv_map", "uv_map_name", "use_o
 # What means something for surfaces only, or for clouds only; the other one's functions do not take it.
 SURFACE_SETTINGS = (
     *("use_seams", "mark_seams", "weld", "merge", "holes", "chart_scale", "geodesics"),
-    *("stretch_solver", "stretch_iterations"),
+    *("together_max", "stretch_solver", "stretch_iterations"),
 )
 CLOUD_SETTINGS = ("neighbours",)
 
@@ -325,7 +339,7 @@ MAIN_SETTINGS = ("stretch_limit", "texture_size", "margin", "rotation", "use_sea
 ADVANCED_SETTINGS = (
     ("Result", ("uv_map", "uv_map_name", "use_original_bounds", "mark_seams")),
     ("Charts", ("neighbours", "weld", "coarse", "merge", "holes", "chart_scale", "seed")),
-    ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max")),
+    ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max", "together_max")),
     ("Embedding", ("model", "kernel_width", "relaxation", "max_sweeps", "tolerance", "update", "initial")),
     ("Stretch", ("stretch_solver", "stretch_iterations")),
 )
@@ -380,8 +394,8 @@ def values(settings):
 def default_values(preset="DEFAULT"):
     """The declared default of every setting under a preset, as plain values."""
     result = {name: deferred.keywords.get("default") for name, deferred in annotations().items()}
-    if preset == "PAPER":
-        result.update(PAPER_VALUES, preset="PAPER")
+    if preset in PRESET_VALUES:
+        result.update(PRESET_VALUES[preset], preset=preset)
     return result
 
 

@@ -70,8 +70,7 @@ impl Flattening {
 ///     ``triangles``, ``landmarks`` (all vertices if they were embedded together), ``sigma``, ``sweeps``, ``converged``,
 ///     ``log_likelihood`` and its ``trace`` over the sweeps (None and empty for Isomap), ``rung`` (what took the flips away;
 ///     ``"embedding"`` if there were none), ``stretch_iterations``, ``boundary_is_simple``, ``seconds`` of each step, and, of
-///     the map straight after the embedding and of the map returned:
-///
+///     the map straight after the embedding and of the map returned,
 ///     ``flips_before``, ``flips_after``: triangles turned over or without area, by an exact test.
 ///     ``l2_before``, ``l2_after``: L2 stretch at the map's best scale. Singular values do not care for orientation, so a
 ///     flipped triangle counts as its mirror image; infinite if a triangle has no area, large where folds leave thin ones.
