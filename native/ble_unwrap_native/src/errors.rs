@@ -171,7 +171,9 @@ impl Raised for EmbeddingError {
             | Self::DistanceOutOfRange { .. }
             | Self::AffinityOutOfRange { .. }
             | Self::TooFewPoints { .. }
-            | Self::NoLikelihood => Kind::Argument,
+            | Self::Disconnected { .. }
+            | Self::TooManyPoints { .. }
+            | Self::WrongColumns { .. } => Kind::Argument,
             Self::Eigen(_) => Kind::Internal,
             Self::Cancelled(error) => error.kind(),
         }

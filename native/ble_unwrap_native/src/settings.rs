@@ -46,6 +46,7 @@ pub(crate) enum Function {
     UnwrapPoints,
     Embed,
     Flatten,
+    Transform,
     GeodesicDistances,
     GraphDistances,
     Measure,
@@ -59,6 +60,7 @@ impl Function {
             Self::UnwrapPoints => "unwrap_points",
             Self::Embed => "embed",
             Self::Flatten => "flatten",
+            Self::Transform => "transform",
             Self::GeodesicDistances => "geodesic_distances",
             Self::GraphDistances => "graph_distances",
             Self::Measure => "measure",
@@ -326,7 +328,8 @@ pub(crate) fn set_word(name: &str, target: &mut dyn Words, value: &Bound<'_, PyA
     if known { Ok(()) } else { Err(refusal(name, &crate::words::listed(&target.words()), value)) }
 }
 
-fn refusal(name: &str, expected: &str, value: &Bound<'_, PyAny>) -> PyErr {
+/// The error for a value that is not what it has to be.
+pub(crate) fn refusal(name: &str, expected: &str, value: &Bound<'_, PyAny>) -> PyErr {
     let found = value.repr().map_or_else(|_| "an object that cannot be shown".into(), |text| text.to_string());
     InvalidArgumentError::new_err(format!("{name}: expected {expected}; found {found}"))
 }

@@ -7,7 +7,7 @@ use ble_unwrap_core::standalone::Connect;
 use ble_unwrap_core::stretch::Solver;
 use ble_unwrap_core::{ChartScale, Holes};
 
-use crate::embed::DataKind;
+use crate::embed::{DataKind, PointDistance};
 use crate::settings::Preset;
 
 /// A choice that has a word for each of its values.
@@ -45,6 +45,7 @@ macro_rules! words {
 }
 
 words!(DataKind { "points" => Points, "distances" => Distances, "affinities" => Affinities });
+words!(PointDistance { "euclidean" => Euclidean, "geodesic" => Geodesic });
 words!(Preset { "default" => Default, "paper" => Paper, "iso_charts" => IsoCharts });
 words!(Holes { "keep" => Keep, "cut" => Cut });
 words!(ChartScale { "uniform" => Uniform, "stretch" => Stretch });

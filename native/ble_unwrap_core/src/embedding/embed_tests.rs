@@ -452,8 +452,11 @@ fn separate_pieces_are_counted() {
     let input =
         |neighbours| EmbedInput::Points { n: 30, p: 2, data: &data, metric: PointMetric::Geodesic { neighbours } };
     let found = run(input(3), &with(2), &EmbeddingSettings::default()).err().expect("three rows");
-    assert_eq!(found, EmbeddingError::Disconnected { neighbours: 3, pieces: 3, points: 30, largest: 10 });
-    assert!(found.to_string().contains("3 pieces") && found.to_string().contains("raise neighbours"), "{found}");
+    assert_eq!(
+        found,
+        EmbeddingError::Disconnected { neighbours: 3, pieces: 3, points: 30, largest: 10, enough: Some(10) }
+    );
+    assert!(found.to_string().contains("3 pieces") && found.to_string().contains("raise neighbours to 10"), "{found}");
     assert!(run(input(12), &with(2), &EmbeddingSettings::default()).is_ok());
     let none = run(input(0), &with(2), &EmbeddingSettings::default());
     assert!(matches!(none, Err(EmbeddingError::InvalidSetting { name: "neighbours", .. })));

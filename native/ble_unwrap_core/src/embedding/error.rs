@@ -94,7 +94,8 @@ pub enum EmbeddingError {
     /// The graph of nearest neighbours falls into pieces, between which there is no distance.
     #[error(
         "the graph of {neighbours} nearest neighbours falls into {pieces} pieces, the largest of {largest} of the \
-         {points} points; raise neighbours, or embed each piece by itself"
+         {points} points; {}, or embed each piece by itself",
+        raise(*.enough)
     )]
     Disconnected {
         /// Number of neighbours that points are joined to.
@@ -105,6 +106,8 @@ pub enum EmbeddingError {
         points: usize,
         /// Number of points in the largest piece.
         largest: usize,
+        /// The least number of neighbours that connects them, where one was found.
+        enough: Option<usize>,
     },
     /// The matrix of all pairs does not fit in memory.
     #[error("the {points} x {points} matrix of all pairs does not fit in memory; embed by landmarks (100 or so)")]
@@ -142,4 +145,9 @@ impl From<EigenError> for EmbeddingError {
 /// What to do about an infinite distance.
 fn hint(distance: f64) -> &'static str {
     if distance == f64::INFINITY { "; pieces with no path between them are embedded each by itself" } else { "" }
+}
+
+/// How many neighbours to ask for.
+fn raise(enough: Option<usize>) -> String {
+    enough.map_or_else(|| "raise neighbours".into(), |k| format!("raise neighbours to {k}"))
 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::Progress;
 use crate::geodesics::{
-    DijkstraScratch, WeightedGraph, dijkstra, farthest_nodes, graph_distances, knn_graph, nearest_points,
+    DijkstraScratch, WeightedGraph, connectivity, dijkstra, farthest_nodes, graph_distances, knn_graph, nearest_points,
 };
 use crate::progress::Cancelled;
 
@@ -15,6 +15,9 @@ use super::landmark_regression::Evidence;
 
 /// Points looked at a task when distances to one point are taken.
 const CHUNK: usize = 4096;
+
+/// Numbers of neighbours looked at for one that connects the graph.
+const MOST_NEIGHBOURS_TRIED: usize = 64;
 
 /// Checked input, and the graph it is measured on.
 pub(super) enum Source<'a> {
@@ -31,12 +34,17 @@ impl<'a> Source<'a> {
             EmbedInput::Points { n, p, data, metric: PointMetric::Euclidean } => Self::Points { n, p, data },
             EmbedInput::Points { n, p, data, metric: PointMetric::Geodesic { neighbours } } => {
                 let graph = knn_graph(data, p, neighbours, progress)?;
-                let (label, pieces) = graph.components();
-                if pieces > 1 {
-                    let mut sizes = vec![0; pieces];
-                    label.iter().for_each(|l| sizes[*l as usize] += 1);
-                    let largest = sizes.into_iter().max().unwrap_or(0);
-                    return Err(EmbeddingError::Disconnected { neighbours, pieces, points: n, largest });
+                let most = MOST_NEIGHBOURS_TRIED.max(2 * neighbours);
+                let found = connectivity(&graph, data, p, neighbours, most, progress)?;
+                if !found.is_connected() {
+                    let largest = found.pieces.iter().map(|piece| piece.size).max().unwrap_or(0);
+                    return Err(EmbeddingError::Disconnected {
+                        neighbours,
+                        pieces: found.pieces.len(),
+                        points: n,
+                        largest,
+                        enough: found.enough,
+                    });
                 }
                 Self::Graph { n, p, data, neighbours, graph }
             }
