@@ -58,8 +58,8 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
 
     Each pair of points has an affinity p, which falls with their distance, and the embedding makes the Bernoulli
     likelihood of the p greatest: log-odds ``x_i · x_j + a_i + a_j`` in the default model, which for points in the plane
-    are minus half their squared distance. Classical scaling (Isomap) is the limit of wide kernels; narrower ones let
-    distant pairs go and keep neighbours.
+    are minus half their squared distance. Wide kernels weigh all pairs alike, and the result is next to that of
+    classical scaling (Isomap); narrower ones let distant pairs go and keep neighbours.
 
     Parameters
     ----------
@@ -462,7 +462,7 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
                 raise ValueError("all points coincide, or are too close together for the squares of their distances")
             self.sigma_ = self._kernel_width(own, mean_squared)
             if self.model != "isomap":
-                options["kernel_width"] = self.sigma_ / mean_squared
+                options["sigma"] = self.sigma_
         if self.model != "isomap":
             options |= {
                 "relaxation": float(self.relaxation),
