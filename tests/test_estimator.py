@@ -271,7 +271,7 @@ def test_of_an_asymmetric_matrix_the_mean_with_its_transpose_counts():
 
 def test_agrees_with_the_compiled_function():
     model = BernoulliLogisticEmbedding(kernel_width=0.1).fit(BALL)
-    compiled = native.embed(BALL, kernel_width=0.1, max_sweeps=1000)
+    compiled = native.embed(BALL, kernel_width=0.1, max_sweeps=500)
     assert model.sigma_ == pytest.approx(compiled.report["sigma"], rel=1e-12)
     assert model.log_likelihood_ == pytest.approx(compiled.report["log_likelihood"], rel=1e-9)
     assert model.trace_ == pytest.approx(np.asarray(compiled.report["trace"]), rel=1e-9)
@@ -281,7 +281,7 @@ def test_agrees_with_the_compiled_function():
     own = squareform(pdist(BALL))
     chosen = by_landmarks.landmark_indices_
     compiled_landmarks = native.embed(
-        own[np.ix_(chosen, chosen)], kind="distances", sigma=by_landmarks.sigma_, max_sweeps=1000
+        own[np.ix_(chosen, chosen)], kind="distances", sigma=by_landmarks.sigma_, max_sweeps=500
     )
     rest = np.setdiff1d(np.arange(80), chosen)
     placed = np.vstack(
