@@ -1,6 +1,6 @@
 //! `geodesic_distances` on meshes and `graph_distances` of clouds.
 
-use ble_unwrap_core::standalone::{CloudSettings, cloud_distances, surface_distances};
+use ble_unwrap_core::standalone::{CloudDistanceSettings, cloud_distances, surface_distances};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -139,7 +139,7 @@ pub(crate) fn graph_distances(
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
     let call = settings::from_keywords(settings, Function::GraphDistances)?;
-    let mut cloud = CloudSettings::default();
+    let mut cloud = CloudDistanceSettings::default();
     if let Some(given) = neighbours {
         cloud.neighbours = settings::whole("neighbours", given, [1, MOST_NEIGHBOURS], "")?;
     }
