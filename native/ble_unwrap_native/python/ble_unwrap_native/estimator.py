@@ -174,7 +174,7 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
     radius of a round cloud in the plane. Where points lie in ``n_components`` dimensions every width finds them. Where
     they do not (curved surfaces, noise, more dimensions) a wide kernel serves all distances alike, far ones of which
     there are most, and which a graph measures worst; a narrow one keeps neighbours, as trustworthiness and continuity
-    measure, at hardly less correlation of all distances. Below 0.03 a fit takes hundreds of sweeps more for little gain,
+    measure, at hardly less correlation of all distances. Below 0.03 a fit takes hundreds of sweeps more for little,
     and from a random start folds are likely to stay. Of points far from all others the likelihood says little more than
     that, and serial sweeps move them slowly.
 
