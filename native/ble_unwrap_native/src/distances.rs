@@ -1,6 +1,6 @@
 //! `geodesic_distances` on meshes and `graph_distances` of clouds.
 
-use ble_unwrap_core::standalone::{CloudSettings, cloud_distances, surface_distances};
+use ble_unwrap_core::standalone::{CloudDistanceSettings, cloud_distances, surface_distances};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -22,7 +22,7 @@ use crate::unwrap::MeshArrays;
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
 /// geodesics : {"fast_marching", "dijkstra"}
-///     Fast marching across triangles, or shortest paths along edges, which are some 6 % too long.
+///     Fast marching across triangles, or shortest paths along edges, some 5 to 9 % too long.
 /// threads : int
 ///     Threads to work with; 0 for as many as the machine has. The result does not depend on it.
 ///
@@ -43,8 +43,9 @@ use crate::unwrap::MeshArrays;
 ///
 /// Notes
 /// -----
-/// Vertices at one position count as one. ACCURACY Not
-/// guaranteed: symmetry and the triangle inequality beyond that error. Some 0.4 µs a vertex and source.
+/// Vertices at one position count as one. Exact to rounding on flat surfaces. Elsewhere of first order in the edge length:
+/// 0.1 to 0.4 % on average, and up to 3 % at single vertices, of meshes of some thousand vertices against exact polyhedral
+/// distances. Not guaranteed: symmetry and the triangle inequality beyond that error. Some 0.4 µs a vertex and source.
 ///
 /// Kimmel, Sethian: Computing geodesic paths on manifolds, PNAS 95, 1998.
 #[pyfunction]
@@ -112,8 +113,9 @@ const MOST_NEIGHBOURS: usize = 100_000;
 ///
 /// Notes
 /// -----
-/// An estimate of distances on the surface that the points sample: along zigzags, which are too long by some per cent
-/// that more neighbours lessen and more points do not, and through space where edges leave the surface. Coincident
+/// An estimate of distances on the surface that the points sample: along zigzags, which are 3 % too long on average for
+/// random points with 12 neighbours and 0.9 % with 24, however many points, and through space where edges leave the
+/// surface. Coincident
 /// points count as one place and are at distance 0. Across a bridge everything passes through its two ends. The
 /// triangle inequality holds to rounding. The graph takes O(n log n) in few dimensions, a source O(n log n) or what lies
 /// within the radius, and a row of 8n bytes.
@@ -137,7 +139,7 @@ pub(crate) fn graph_distances(
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
     let call = settings::from_keywords(settings, Function::GraphDistances)?;
-    let mut cloud = CloudSettings::default();
+    let mut cloud = CloudDistanceSettings::default();
     if let Some(given) = neighbours {
         cloud.neighbours = settings::whole("neighbours", given, [1, MOST_NEIGHBOURS], "")?;
     }
@@ -149,9 +151,8 @@ pub(crate) fn graph_distances(
     }
     let (points, n, p) = arrays::real_matrix(points, Argument { name: "points", shape: "(n, p)" })?;
     if p == 0 {
-        return Err(InvalidArgumentError::new_err(
-            "points: expected at least 1 coordinate a point, found shape (n, 0)",
-        ));
+        let text = format!("points: expected at least 1 coordinate a point, found shape ({n}, 0)");
+        return Err(InvalidArgumentError::new_err(text));
     }
     let sources =
         sources.map(|given| arrays::indices(given, Argument { name: "sources", shape: "(k,)" })).transpose()?;

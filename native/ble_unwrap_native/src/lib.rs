@@ -1,9 +1,11 @@
 //! Python bindings of BLE Unwrap: converts, calls the core, converts back. Registration alone is here.
 
 mod arrays;
+mod cloud;
 mod distances;
 mod embed;
 mod errors;
+mod flatten;
 mod job;
 mod measure;
 mod owned_array;
@@ -21,9 +23,13 @@ mod native {
     use pyo3::prelude::*;
 
     #[pymodule_export]
+    use crate::cloud::{PointAtlas, submit_unwrap_points, unwrap_points};
+    #[pymodule_export]
     use crate::distances::{geodesic_distances, graph_distances};
     #[pymodule_export]
     use crate::embed::{Embedding, embed};
+    #[pymodule_export]
+    use crate::flatten::{Flattening, flatten};
     #[pymodule_export]
     use crate::job::Job;
     #[pymodule_export]

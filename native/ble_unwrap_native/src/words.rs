@@ -46,7 +46,7 @@ macro_rules! words {
 
 words!(DataKind { "points" => Points, "distances" => Distances, "affinities" => Affinities });
 words!(PointDistance { "euclidean" => Euclidean, "geodesic" => Geodesic });
-words!(Preset { "default" => Default, "paper" => Paper });
+words!(Preset { "default" => Default, "paper" => Paper, "iso_charts" => IsoCharts });
 words!(Holes { "keep" => Keep, "cut" => Cut });
 words!(ChartScale { "uniform" => Uniform, "stretch" => Stretch });
 words!(Connect { "error" => Error, "bridge" => Bridge, "separate" => Separate });

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::kd_tree::KdTree;
-use super::knn_graph::Places;
+use super::knn_graph::{Places, search_each};
 use super::weighted_graph::WeightedGraph;
 use crate::mesh::DisjointSets;
 use crate::progress::{Cancelled, Progress};
@@ -134,7 +134,7 @@ pub fn least_neighbours(
     let mut tried = FIRST_TRY.min(most);
     // Doubles each time: at most 64 rounds.
     while tried > 0 {
-        let ranked = places.map(progress, |i, found, neighbours: &mut Vec<[u32; 2]>| {
+        let ranked = search_each(tree.order(), progress, |i, found, neighbours: &mut Vec<[u32; 2]>| {
             tree.nearest(i, tried, found);
             neighbours.extend(found.iter().map(|&(_, j)| [i, j]));
         })?;

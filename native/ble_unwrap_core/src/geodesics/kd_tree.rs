@@ -19,6 +19,8 @@ pub(super) struct KdTree<'p> {
     points: &'p [f64],
     dimension: usize,
     order: Vec<u32>,
+    /// The coordinates in this order: a leaf is one piece of memory.
+    sorted: Vec<f64>,
     nodes: Vec<Node>,
     /// For each node its least coordinates and then its greatest.
     boxes: Vec<f64>,
@@ -50,15 +52,23 @@ impl<'p> KdTree<'p> {
     /// Sorts the `chosen` ones among points (row-major, `dimension` coordinates each, all of them finite)
     /// into a tree. O(n log n).
     pub(super) fn new(points: &'p [f64], dimension: usize, chosen: Vec<u32>) -> Self {
-        let mut tree = Self { points, dimension, order: chosen, nodes: Vec::new(), boxes: Vec::new() };
+        let mut tree =
+            Self { points, dimension, order: chosen, sorted: Vec::new(), nodes: Vec::new(), boxes: Vec::new() };
         if !tree.order.is_empty() {
             tree.build();
         }
+        tree.sorted = tree.order.iter().flat_map(|&i| tree.point(i)).copied().collect();
         tree
     }
 
     fn point(&self, i: u32) -> &'p [f64] {
         &self.points[i as usize * self.dimension..][..self.dimension]
+    }
+
+    /// The points of the tree, so that neighbours are near each other: searches in this order find in the cache what
+    /// they need.
+    pub(super) fn order(&self) -> &[u32] {
+        &self.order
     }
 
     fn build(&mut self) {
@@ -121,9 +131,15 @@ impl<'p> KdTree<'p> {
         sums.total()
     }
 
-    /// Hands leaves to `visit`, the nearer first more or less. Left out is what lies beyond a squared
+    /// Hands leaves, as indices and coordinates, to `visit`, the nearer first more or less. Left out is what lies beyond a squared
     /// distance, at first `farthest` and then what `visit` returned last, and what is below nodes that `skip`.
-    fn visit(&self, q: &[f64], mut farthest: f64, skip: impl Fn(u32) -> bool, mut visit: impl FnMut(&[u32]) -> f64) {
+    fn visit(
+        &self,
+        q: &[f64],
+        mut farthest: f64,
+        skip: impl Fn(u32) -> bool,
+        mut visit: impl FnMut(&[u32], &[f64]) -> f64,
+    ) {
         if self.nodes.is_empty() {
             return;
         }
@@ -134,7 +150,9 @@ impl<'p> KdTree<'p> {
             }
             let node = self.nodes[index as usize];
             if node.second == 0 {
-                farthest = visit(&self.order[node.begin as usize..node.end as usize]);
+                let [begin, end] = [node.begin, node.end].map(|at| at as usize);
+                let coordinates = &self.sorted[begin * self.dimension..end * self.dimension];
+                farthest = visit(&self.order[begin..end], coordinates);
                 continue;
             }
             let [a, b] = [index + 1, node.second].map(|child| (child, self.square_to(child, q)));
@@ -157,9 +175,12 @@ impl<'p> KdTree<'p> {
             q,
             f64::INFINITY,
             |_| false,
-            |leaf| {
-                for &i in leaf.iter().filter(|&&i| i != query) {
-                    let square = square_between(q, self.point(i));
+            |leaf, coordinates| {
+                for (&i, p) in leaf.iter().zip(coordinates.chunks_exact(self.dimension)) {
+                    let square = square_between(q, p);
+                    if i == query || found.len() == k && square > found[k - 1].0 {
+                        continue;
+                    }
                     let place = found.partition_point(|&(d, j)| d < square || (d == square && j < i));
                     if place < k {
                         found.truncate(k - 1);
@@ -180,9 +201,12 @@ impl<'p> KdTree<'p> {
             q,
             best.square,
             |node| common[node as usize] == own,
-            |leaf| {
-                for &i in leaf.iter().filter(|&&i| label[i as usize] != own) {
-                    let square = square_between(q, self.point(i));
+            |leaf, coordinates| {
+                for (&i, p) in leaf.iter().zip(coordinates.chunks_exact(self.dimension)) {
+                    if label[i as usize] == own {
+                        continue;
+                    }
+                    let square = square_between(q, p);
                     let pair = Pair { square, low: query.min(i), high: query.max(i) };
                     if pair < best {
                         best = pair;

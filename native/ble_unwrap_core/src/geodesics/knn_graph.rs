@@ -17,16 +17,17 @@ const CHUNK: usize = 256;
 /// `k` of them would be an island: the first of them stands for all, and the others hang from it
 /// by edges of length 0. Points with a coordinate that is not finite get no edge.
 ///
-/// The paper uses 12 neighbours (section 5). Whether they connect the graph, and how to mend it if not,
-/// tells [`connectivity()`](super::connectivity()). O(n log n) in few dimensions; the same graph for any number of
-/// threads.
+/// Whether so many neighbours connect the graph, and how to mend it if not, tells
+/// [`connectivity()`](super::connectivity()). Distances along the graph are those of the paper's section 5.1 for point
+/// clouds; it does not say how many neighbours, 12 serve well. O(n log n) in few dimensions; the same graph for any
+/// number of threads.
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
 pub fn knn_graph(points: &[f64], dimension: usize, k: usize, progress: &Progress) -> Result<WeightedGraph, Cancelled> {
     let places = Places::of(points, dimension);
     let tree = KdTree::new(points, dimension, places.first.clone());
-    let edges = places.map(progress, |i, found, edges: &mut Vec<(usize, usize, f64)>| {
+    let edges = search_each(tree.order(), progress, |i, found, edges: &mut Vec<(usize, usize, f64)>| {
         tree.nearest(i, k, found);
         edges.extend(found.iter().map(|&(square, j)| (i as usize, j as usize, square.sqrt())));
     })?;
@@ -47,9 +48,6 @@ pub(super) struct Places {
     pub(super) again: Vec<[u32; 2]>,
 }
 
-/// What a search writes its neighbours to.
-type Found = Vec<(f64, u32)>;
-
 impl Places {
     /// Finds the points that coincide. O(n log n).
     pub(super) fn of(points: &[f64], dimension: usize) -> Self {
@@ -69,23 +67,23 @@ impl Places {
         again.sort_unstable();
         Self { count, first, again }
     }
+}
 
-    /// Runs `search` for the first point of each place, in parallel; what it adds, in order of the points.
-    pub(super) fn map<T: Send>(
-        &self,
-        progress: &Progress,
-        search: impl Fn(u32, &mut Found, &mut Vec<T>) + Sync,
-    ) -> Result<Vec<Vec<T>>, Cancelled> {
-        let chunks = self.first.par_chunks(CHUNK).map(|chunk| {
-            progress.check()?;
-            let (mut found, mut results) = (Vec::new(), Vec::new());
-            for &i in chunk {
-                search(i, &mut found, &mut results);
-            }
-            Ok(results)
-        });
-        chunks.collect()
-    }
+/// Runs `search` for each of some points, in parallel; what it adds, in their order.
+pub(super) fn search_each<T: Send>(
+    points: &[u32],
+    progress: &Progress,
+    search: impl Fn(u32, &mut Vec<(f64, u32)>, &mut Vec<T>) + Sync,
+) -> Result<Vec<Vec<T>>, Cancelled> {
+    let chunks = points.par_chunks(CHUNK).map(|chunk| {
+        progress.check()?;
+        let (mut found, mut results) = (Vec::new(), Vec::new());
+        for &i in chunk {
+            search(i, &mut found, &mut results);
+        }
+        Ok(results)
+    });
+    chunks.collect()
 }
 
 #[cfg(test)]

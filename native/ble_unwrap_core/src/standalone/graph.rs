@@ -1,7 +1,5 @@
 //! Geodesic distances between the points of any cloud.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -13,6 +11,10 @@ use crate::progress::{Cancelled, Progress, Stage};
 /// Numbers of neighbours looked at for one that connects a cloud: above it the edges of most clouds leave their surface,
 /// and the search takes longer than the distances.
 const MOST_NEIGHBOURS_TRIED: usize = 64;
+
+/// Sources whose rows are filled together: enough for many threads, and no more memory is touched before the
+/// next look at the cancel flag.
+const SOURCES_AT_ONCE: usize = 256;
 
 /// What becomes of a cloud whose neighbours do not connect it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +29,7 @@ pub enum Connect {
 
 /// How the distances of a cloud are measured.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CloudSettings {
+pub struct CloudDistanceSettings {
     /// Neighbours each point is joined to, at least 1.
     pub neighbours: usize,
     /// What becomes of a cloud in several pieces.
@@ -36,8 +38,9 @@ pub struct CloudSettings {
     pub radius: f64,
 }
 
-impl Default for CloudSettings {
-    /// The paper's 12 neighbours (section 5), no bound; a cloud in pieces is an error.
+impl Default for CloudDistanceSettings {
+    /// 12 neighbours, whose distances are 3 % too long on average where 6 give 10 %, and which seldom leave a surface
+    /// that 24 leave; no bound; a cloud in pieces is an error.
     fn default() -> Self {
         Self { neighbours: 12, connect: Connect::Error, radius: f64::INFINITY }
     }
@@ -45,7 +48,7 @@ impl Default for CloudSettings {
 
 /// Why there are no distances.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum CloudError {
+pub enum CloudDistancesError {
     /// The coordinates do not make points.
     #[error("{values} coordinates do not make points of {dimension} coordinates each")]
     WrongLength {
@@ -106,8 +109,8 @@ fn others_text(others: usize) -> String {
 ///
 /// `points` holds `dimension` ≥ 1 coordinates a point, row after row. An estimate of the distance on the surface that
 /// the points sample: along zigzags, so too long by some per cent that more points do not take away but more neighbours
-/// do, and too short where edges leave the surface. On random samples 12 neighbours are some 4 % too long; see the
-/// accuracy table of the tests. Points that coincide are at distance 0. With all sources the matrix is exactly
+/// do, and too short where edges leave the surface. On random points of smooth surfaces it is 3 % too long on average with
+/// 12 neighbours, 0.9 % with 24. Points that coincide are at distance 0. With all sources the matrix is exactly
 /// symmetric, and the triangle inequality holds to rounding. Infinite: beyond `radius`; between pieces, if
 /// these are to be separate. The same for any number of threads.
 ///
@@ -120,24 +123,24 @@ fn others_text(others: usize) -> String {
 /// nonlinear dimensionality reduction, Science 290 (2000), 2319–2323.
 ///
 /// # Errors
-/// [`CloudError`]: coordinates that are not finite or do not fill the last point, a source that is no point, no
+/// [`CloudDistancesError`]: coordinates that are not finite or do not fill the last point, a source that is no point, no
 /// neighbours, several pieces ([`Connect::Error`]), too large, cancelled.
 pub fn cloud_distances(
     points: &[f64],
     dimension: usize,
     sources: Option<&[i32]>,
-    settings: &CloudSettings,
+    settings: &CloudDistanceSettings,
     progress: &Progress,
-) -> Result<Vec<f64>, CloudError> {
+) -> Result<Vec<f64>, CloudDistancesError> {
     progress.check()?;
     progress.enter(Stage::Condition);
     let n = checked_count(points, dimension)?;
     let all = sources.is_none();
     let sources = checked_sources(sources, n)?;
     if settings.neighbours == 0 {
-        return Err(CloudError::NoNeighbours);
+        return Err(CloudDistancesError::NoNeighbours);
     }
-    let too_large = || CloudError::TooLarge { sources: sources.len(), points: n };
+    let too_large = || CloudDistancesError::TooLarge { sources: sources.len(), points: n };
     let count = sources.len().checked_mul(n).ok_or_else(too_large)?;
     let mut rows: Vec<f64> = Vec::new();
     rows.try_reserve_exact(count).map_err(|_| too_large())?;
@@ -145,22 +148,24 @@ pub fn cloud_distances(
     let scale = power_of_two_within(points);
     let scaled: Vec<f64> = points.iter().map(|x| x / scale).collect();
     let graph = connected_graph(&scaled, dimension, settings, progress)?;
-    rows.resize(count, f64::INFINITY);
-    if rows.is_empty() {
+    if count == 0 {
         return Ok(rows);
     }
     progress.enter(Stage::Charts);
-    let done = AtomicUsize::new(0);
-    rows.par_chunks_mut(n).zip(&sources).try_for_each_init(DijkstraScratch::default, |scratch, (row, &source)| {
-        progress.check()?;
-        let distances = dijkstra_within(&graph, &[(source, 0.0)], settings.radius / scale, scratch, progress)?;
-        for (to, &distance) in row.iter_mut().zip(distances) {
-            *to = distance * scale;
-        }
-        let share = (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / sources.len() as f64;
-        progress.advance(Stage::Charts, share);
-        Ok::<(), Cancelled>(())
-    })?;
+    for sources in sources.chunks(SOURCES_AT_ONCE) {
+        let first = rows.len();
+        rows.resize(first + sources.len() * n, f64::INFINITY);
+        let tasks = rows[first..].par_chunks_mut(n).zip(sources);
+        tasks.try_for_each_init(DijkstraScratch::default, |scratch, (row, &source)| {
+            progress.check()?;
+            let distances = dijkstra_within(&graph, &[(source, 0.0)], settings.radius / scale, scratch, progress)?;
+            for (to, &distance) in row.iter_mut().zip(distances) {
+                *to = distance * scale;
+            }
+            Ok::<(), Cancelled>(())
+        })?;
+        progress.advance(Stage::Charts, rows.len() as f64 / count as f64);
+    }
     if all {
         make_symmetric(&mut rows, n);
     }
@@ -171,9 +176,9 @@ pub fn cloud_distances(
 fn connected_graph(
     points: &[f64],
     dimension: usize,
-    settings: &CloudSettings,
+    settings: &CloudDistanceSettings,
     progress: &Progress,
-) -> Result<WeightedGraph, CloudError> {
+) -> Result<WeightedGraph, CloudDistancesError> {
     let graph = knn_graph(points, dimension, settings.neighbours, progress)?;
     match settings.connect {
         Connect::Separate => Ok(graph),
@@ -184,30 +189,30 @@ fn connected_graph(
         Connect::Error => {
             let most = MOST_NEIGHBOURS_TRIED.max(2 * settings.neighbours);
             let found = connectivity(&graph, points, dimension, settings.neighbours, most, progress)?;
-            if found.is_connected() { Ok(graph) } else { Err(CloudError::Disconnected(Box::new(found))) }
+            if found.is_connected() { Ok(graph) } else { Err(CloudDistancesError::Disconnected(Box::new(found))) }
         }
     }
 }
 
 /// The number of points, all of whose coordinates are finite.
-fn checked_count(points: &[f64], dimension: usize) -> Result<usize, CloudError> {
+fn checked_count(points: &[f64], dimension: usize) -> Result<usize, CloudDistancesError> {
     if dimension == 0 || !points.len().is_multiple_of(dimension) {
-        return Err(CloudError::WrongLength { values: points.len(), dimension });
+        return Err(CloudDistancesError::WrongLength { values: points.len(), dimension });
     }
     let mut nowhere =
         points.chunks_exact(dimension).enumerate().filter(|(_, p)| !p.iter().all(|x| x.is_finite())).map(|(i, _)| i);
     match nowhere.next() {
-        Some(point) => Err(CloudError::NotFinite { point, others: nowhere.count() }),
+        Some(point) => Err(CloudDistancesError::NotFinite { point, others: nowhere.count() }),
         None => Ok(points.len() / dimension),
     }
 }
 
 /// The sources as nodes; all points if none are given.
-fn checked_sources(sources: Option<&[i32]>, n: usize) -> Result<Vec<usize>, CloudError> {
+fn checked_sources(sources: Option<&[i32]>, n: usize) -> Result<Vec<usize>, CloudDistancesError> {
     let Some(sources) = sources else { return Ok((0..n).collect()) };
     let node = |(number, &point): (usize, &i32)| match usize::try_from(point) {
         Ok(node) if node < n => Ok(node),
-        _ => Err(CloudError::Source { number, point, point_count: n }),
+        _ => Err(CloudDistancesError::Source { number, point, point_count: n }),
     };
     sources.iter().enumerate().map(node).collect()
 }
@@ -251,12 +256,12 @@ mod tests {
         points
     }
 
-    fn distances(points: &[f64], sources: Option<&[i32]>, settings: &CloudSettings) -> Result<Vec<f64>, CloudError> {
+    fn distances(points: &[f64], sources: Option<&[i32]>, settings: &CloudDistanceSettings) -> Result<Vec<f64>, CloudDistancesError> {
         cloud_distances(points, 4, sources, settings, &Progress::new())
     }
 
-    fn by(neighbours: usize, connect: Connect) -> CloudSettings {
-        CloudSettings { neighbours, connect, ..CloudSettings::default() }
+    fn by(neighbours: usize, connect: Connect) -> CloudDistanceSettings {
+        CloudDistanceSettings { neighbours, connect, ..CloudDistanceSettings::default() }
     }
 
     #[test]
@@ -276,7 +281,7 @@ mod tests {
     #[test]
     fn all_pairs_are_symmetric_to_the_bit_and_scale_with_the_points() {
         let points: Vec<f64> = sheet(14, 11, 0).iter().enumerate().map(|(i, x)| x + 0.2 * (i as f64).sin()).collect();
-        let d = distances(&points, None, &CloudSettings::default()).expect("connected");
+        let d = distances(&points, None, &CloudDistanceSettings::default()).expect("connected");
         for i in 0..154 {
             for j in 0..154 {
                 assert_eq!(d[i * 154 + j].to_bits(), d[j * 154 + i].to_bits());
@@ -284,7 +289,7 @@ mod tests {
         }
         for factor in [2f64.powi(-900), 2f64.powi(1000)] {
             let scaled: Vec<f64> = points.iter().map(|x| x * factor).collect();
-            let found = distances(&scaled, None, &CloudSettings::default()).expect("connected");
+            let found = distances(&scaled, None, &CloudDistanceSettings::default()).expect("connected");
             assert!(found.iter().zip(&d).all(|(a, b)| *a == b * factor), "squares of {factor:e} leave the range");
         }
     }
@@ -293,9 +298,9 @@ mod tests {
     fn a_cloud_in_pieces_is_an_error_joined_or_left_alone() {
         let points = sheet(10, 10, 20);
         let found = distances(&points, Some(&[0]), &by(5, Connect::Error));
-        let Err(CloudError::Disconnected(found)) = found else { panic!("two pieces: {found:?}") };
+        let Err(CloudDistancesError::Disconnected(found)) = found else { panic!("two pieces: {found:?}") };
         assert_eq!((found.pieces.len(), found.pieces[1].size, found.enough), (2, 20, Some(20)));
-        let text = CloudError::Disconnected(found).to_string();
+        let text = CloudDistancesError::Disconnected(found).to_string();
         assert!(text.contains("20 about 100; 20 neighbours would connect them; or bridge"), "{text}");
 
         let apart = distances(&points, Some(&[0]), &by(5, Connect::Separate)).expect("two pieces");
@@ -308,8 +313,8 @@ mod tests {
     #[test]
     fn beyond_the_radius_is_infinity() {
         let points = sheet(20, 20, 0);
-        let all = distances(&points, Some(&[7]), &CloudSettings::default()).expect("connected");
-        let settings = CloudSettings { radius: 4.5, ..CloudSettings::default() };
+        let all = distances(&points, Some(&[7]), &CloudDistanceSettings::default()).expect("connected");
+        let settings = CloudDistanceSettings { radius: 4.5, ..CloudDistanceSettings::default() };
         let near = distances(&points, Some(&[7]), &settings).expect("connected");
         assert!(all.iter().zip(&near).all(|(a, n)| if *a <= 4.5 { a == n } else { n.is_infinite() }));
         assert!(near.iter().any(|d| d.is_infinite()));
@@ -318,24 +323,24 @@ mod tests {
     #[test]
     fn what_is_wrong_is_named() {
         let mut points = sheet(5, 5, 0);
-        let found = distances(&points[..6], None, &CloudSettings::default());
-        assert_eq!(found, Err(CloudError::WrongLength { values: 6, dimension: 4 }));
-        let none = cloud_distances(&points, 0, None, &CloudSettings::default(), &Progress::new());
-        assert_eq!(none, Err(CloudError::WrongLength { values: 100, dimension: 0 }));
+        let found = distances(&points[..6], None, &CloudDistanceSettings::default());
+        assert_eq!(found, Err(CloudDistancesError::WrongLength { values: 6, dimension: 4 }));
+        let none = cloud_distances(&points, 0, None, &CloudDistanceSettings::default(), &Progress::new());
+        assert_eq!(none, Err(CloudDistancesError::WrongLength { values: 100, dimension: 0 }));
         for point in [25, -1] {
-            let found = distances(&points, Some(&[3, point]), &CloudSettings::default());
-            assert_eq!(found, Err(CloudError::Source { number: 1, point, point_count: 25 }));
+            let found = distances(&points, Some(&[3, point]), &CloudDistanceSettings::default());
+            assert_eq!(found, Err(CloudDistancesError::Source { number: 1, point, point_count: 25 }));
         }
-        assert_eq!(distances(&points, None, &by(0, Connect::Bridge)), Err(CloudError::NoNeighbours));
+        assert_eq!(distances(&points, None, &by(0, Connect::Bridge)), Err(CloudDistancesError::NoNeighbours));
         points[13] = f64::NAN;
         points[50] = f64::INFINITY;
-        let found = distances(&points, None, &CloudSettings::default());
-        assert_eq!(found, Err(CloudError::NotFinite { point: 3, others: 1 }));
+        let found = distances(&points, None, &CloudDistanceSettings::default());
+        assert_eq!(found, Err(CloudDistancesError::NotFinite { point: 3, others: 1 }));
         let cancelled = Progress::new();
         cancelled.cancel();
-        let found = cloud_distances(&points, 4, None, &CloudSettings::default(), &cancelled);
-        assert_eq!(found, Err(CloudError::Cancelled(Cancelled)));
-        assert_eq!(distances(&[], None, &CloudSettings::default()), Ok(Vec::new()));
-        assert_eq!(distances(&[1.0; 4], None, &CloudSettings::default()), Ok(vec![0.0]));
+        let found = cloud_distances(&points, 4, None, &CloudDistanceSettings::default(), &cancelled);
+        assert_eq!(found, Err(CloudDistancesError::Cancelled(Cancelled)));
+        assert_eq!(distances(&[], None, &CloudDistanceSettings::default()), Ok(Vec::new()));
+        assert_eq!(distances(&[1.0; 4], None, &CloudDistanceSettings::default()), Ok(vec![0.0]));
     }
 }
