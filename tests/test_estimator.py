@@ -186,18 +186,19 @@ def test_trustworthiness_against_peers(clouds):
     assert found["noisy roll", "BLE, geodesic"] > found["noisy roll", "Isomap"] + 0.01
 
 
-def test_a_narrow_kernel_keeps_neighbours_and_a_wide_one_is_classical_scaling(clouds):
+@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
+def test_a_narrow_kernel_keeps_neighbours_and_a_wide_one_is_near_classical_scaling(clouds):
     """The reason for the default width, where no width lays the data flat."""
     digits = clouds["digits"][:500]
     own = squareform(pdist(digits))
     scaling = BernoulliLogisticEmbedding(metric="precomputed", model="isomap").fit_transform(own)
-    trust, likeness = [], []
-    for width in (0.05, 0.2, 1.0, 20.0):
+    trust, unlike = [], []
+    for width in (0.05, 0.2, 1.0):
         places = BernoulliLogisticEmbedding(metric="precomputed", kernel_width=width).fit_transform(own)
         trust.append(trustworthiness(digits, places, n_neighbors=12))
-        likeness.append(misfit(scaling, places))
-    assert trust[0] > trust[1] + 0.02 and trust[1] > trust[3] - 0.01, trust
-    assert likeness[0] > likeness[1] > likeness[2] > likeness[3] and likeness[3] < 0.02, likeness
+        unlike.append(misfit(scaling, places))
+    assert trust[0] > trust[1] + 0.02 and trust[1] > trust[2], trust
+    assert unlike[0] > unlike[1] > unlike[2] and unlike[2] < 0.01, unlike
 
 
 # What comes out -----------------------------------------------------------------------------------------------------
@@ -270,11 +271,24 @@ def test_of_an_asymmetric_matrix_the_mean_with_its_transpose_counts():
 
 def test_agrees_with_the_compiled_function():
     model = BernoulliLogisticEmbedding(kernel_width=0.1).fit(BALL)
-    compiled = native.embed(BALL, kernel_width=0.1, max_sweeps=1000)
+    compiled = native.embed(BALL, kernel_width=0.1, max_sweeps=500)
     assert model.sigma_ == pytest.approx(compiled.report["sigma"], rel=1e-12)
     assert model.log_likelihood_ == pytest.approx(compiled.report["log_likelihood"], rel=1e-9)
     assert model.trace_ == pytest.approx(np.asarray(compiled.report["trace"]), rel=1e-9)
     assert np.allclose(pdist(model.embedding_), np.sqrt(model.sigma_) * pdist(np.asarray(compiled.coordinates)))
+    # So do landmarks, with the compiled placement of the rest, which knows no prior.
+    by_landmarks = BernoulliLogisticEmbedding(kernel_width=0.3, n_landmarks=40, random_state=0).fit(BALL)
+    own = squareform(pdist(BALL))
+    chosen = by_landmarks.landmark_indices_
+    compiled_landmarks = native.embed(
+        own[np.ix_(chosen, chosen)], kind="distances", sigma=by_landmarks.sigma_, max_sweeps=500
+    )
+    rest = np.setdiff1d(np.arange(80), chosen)
+    placed = np.vstack(
+        [compiled_landmarks.coordinates, compiled_landmarks.transform(np.ascontiguousarray(own[np.ix_(rest, chosen)]))]
+    )
+    here = by_landmarks.embedding_[np.concatenate([chosen, rest])]
+    assert np.allclose(pdist(here), np.sqrt(by_landmarks.sigma_) * pdist(placed), atol=1e-3)
     # The standard pose leaves every log-odds as it is.
     x, a = model.embedding_ / np.sqrt(model.sigma_), model.intercepts_
     y, b = np.asarray(compiled.coordinates), np.asarray(compiled.intercepts)
@@ -366,12 +380,17 @@ def test_the_kernel_is_chosen_by_width_or_by_mean_affinity():
 
 
 def test_a_given_start_is_in_the_scale_of_the_embedding():
-    first = BernoulliLogisticEmbedding(tolerance=1e-9, max_sweeps=5000).fit(BALL)
-    again = BernoulliLogisticEmbedding(initial=first.embedding_, tolerance=1e-6).fit(BALL)
-    assert again.trace_[0] == pytest.approx(first.log_likelihood_, rel=0.02) and again.n_iter_ < first.n_iter_
-    assert misfit(first.embedding_, again.embedding_) < 1e-3
-    by_landmarks = BernoulliLogisticEmbedding(initial=first.embedding_, n_landmarks=50, random_state=0).fit(BALL)
-    assert misfit(first.embedding_, by_landmarks.embedding_) < 0.2
+    data = PLANE + 0.02 * np.random.default_rng(0).normal(size=PLANE.shape)
+    first = BernoulliLogisticEmbedding().fit(data)
+
+    def start(factor):
+        return BernoulliLogisticEmbedding(initial=factor * first.embedding_).fit(data)
+
+    assert start(1.0).trace_[0] == pytest.approx(first.log_likelihood_, rel=1e-3)
+    assert start(1.0).trace_[0] > max(start(0.7).trace_[0], start(1.4).trace_[0])
+    assert misfit(first.embedding_, start(1.0).embedding_) < 1e-6
+    by_landmarks = BernoulliLogisticEmbedding(initial=first.embedding_, n_landmarks=50, random_state=0).fit(data)
+    assert misfit(first.embedding_, by_landmarks.embedding_) < 1e-3
 
 
 def test_truncation_drops_small_affinities():

@@ -6,7 +6,6 @@ import ast
 import ctypes
 import gc
 import io
-import itertools
 import subprocess
 import sys
 import tomllib
@@ -405,55 +404,6 @@ def test_pack_names_what_is_wrong():
     triangle = np.array([[0.0, 0], [1, 0], [0, 1]])
     with pytest.raises(native.InvalidArgumentError, match="margin"):
         native.pack(triangle, np.array([[0, 1, 2]]), np.array([0]), texture_size=8, margin=100)
-
-
-def distances_of(points):
-    return np.linalg.norm(points[:, None] - points[None], axis=-1)
-
-
-@pytest.mark.parametrize("kind", ["points", "distances"])
-def test_embed_reproduces_points_of_the_plane(kind):
-    points = np.random.default_rng(3).random((60, 2))
-    lifted = points @ np.linalg.qr(np.random.default_rng(4).normal(size=(5, 5)))[0][:2]
-    data = lifted if kind == "points" else distances_of(lifted)
-    result = native.embed(data, kind=kind, tolerance=1e-12, max_sweeps=500)
-    found = np.asarray(result.coordinates) * np.sqrt(result.report["sigma"])
-    assert found.shape == (60, 2) and found.dtype == np.float64
-    np.testing.assert_allclose(distances_of(found), distances_of(points), atol=1e-4)
-    assert np.asarray(result.intercepts).shape == (60,)
-    trace = result.report["trace"]
-    assert all(b >= a - 1e-9 * abs(a) for a, b in itertools.pairwise(trace)), "the likelihood fell"
-    assert result.report["log_likelihood"] == trace[-1] and result.report["bregman"] >= -1e-6
-
-
-def test_embed_the_printed_model_from_affinities():
-    points = np.random.default_rng(5).random((40, 3))
-    affinity = np.exp(-4 * distances_of(points) ** 2)
-    settings = {"preset": "paper", "seed": 7, "max_sweeps": 30, "threads": 2}
-    result = native.embed(affinity, kind="affinities", dimensions=3, **settings)
-    assert result.coordinates.shape == (40, 3) and result.intercepts.shape == (0,)
-    assert result.report["sigma"] == 1 and 1 <= result.report["sweeps"] <= 30
-    again = native.embed(affinity, kind="affinities", dimensions=3, **settings)
-    assert bytes(again.coordinates) == bytes(result.coordinates)
-    other = native.embed(affinity, kind="affinities", dimensions=3, **(settings | {"seed": 8}))
-    assert bytes(other.coordinates) != bytes(result.coordinates)
-
-
-def test_embed_names_what_is_wrong():
-    points = np.random.default_rng(6).random((10, 2))
-    with pytest.raises(native.InvalidArgumentError, match=r"a square matrix of distances, found shape \(10, 2\)"):
-        native.embed(points, kind="distances")
-    with pytest.raises(native.InvalidArgumentError, match="kind: expected 'points', 'distances' or 'affinities'"):
-        native.embed(points, kind="graph")
-    with pytest.raises(native.InvalidArgumentError, match="10 points do not span 10 dimensions"):
-        native.embed(points, dimensions=10)
-    with pytest.raises(native.InvalidArgumentError, match="dimensions: expected a whole number from 1 to"):
-        native.embed(points, dimensions=-1)
-    with pytest.raises(native.InvalidArgumentError, match="Isomap"):
-        native.embed(points, model="isomap")
-    points[3, 1] = np.inf
-    with pytest.raises(native.InvalidArgumentError, match="component 1 of point 3"):
-        native.embed(points)
 
 
 def test_single_steps_take_a_job(hill):

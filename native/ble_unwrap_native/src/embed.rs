@@ -117,7 +117,7 @@ pub(crate) enum PointDistance {
 const MOST_DIMENSIONS: usize = 100_000;
 /// More neighbours make a graph larger than the matrix it is to stand for.
 const MOST_NEIGHBOURS: usize = 100_000;
-/// The paper's number (section 5.1).
+/// As many as `graph_distances` takes: distances 3 % too long on average, where 6 give 10 %.
 const DEFAULT_NEIGHBOURS: usize = 12;
 
 /// Embed points, distances or affinities in few dimensions by Bernoulli logistic embedding.

@@ -50,7 +50,7 @@ class _GeodesicSettings(_Threads, total=False):
     geodesics: Literal["fast_marching", "dijkstra"]
 
 @type_check_only
-class _EmbeddingSettings(_Threads, total=False):
+class _FitSettings(_Threads, total=False):
     seed: int
     model: Literal["default", "paper", "isomap"]
     kernel_width: float | None
@@ -58,6 +58,9 @@ class _EmbeddingSettings(_Threads, total=False):
     max_sweeps: int
     tolerance: float
     update: Literal["serial", "parallel"]
+
+@type_check_only
+class _EmbeddingSettings(_FitSettings, total=False):
     initial: Literal["mds", "random"]
 
 @type_check_only
@@ -122,6 +125,7 @@ class Embedding:
     def intercepts(self) -> Array: ...
     @property
     def report(self) -> dict[str, Any]: ...
+    def transform(self, data: Buffer, *, job: Job | None = None, **settings: Unpack[_Threads]) -> Array: ...
 
 @final
 class Flattening:
@@ -199,8 +203,15 @@ def embed(
     *,
     kind: Literal["points", "distances", "affinities"] = "points",
     dimensions: int = 2,
+    metric: Literal["euclidean", "geodesic"] = "euclidean",
+    neighbours: int = 12,
+    landmarks: int | None = None,
+    initial: Literal["mds", "random"] | Buffer | None = None,
+    mean_affinity: float | None = None,
+    sigma: float | None = None,
+    truncation: float = 0.0,
     job: Job | None = None,
-    **settings: Unpack[_EmbeddingSettings],
+    **settings: Unpack[_FitSettings],
 ) -> Embedding: ...
 def flatten(
     positions: Buffer,

@@ -58,8 +58,8 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
 
     Each pair of points has an affinity p, which falls with their distance, and the embedding makes the Bernoulli
     likelihood of the p greatest: log-odds ``x_i · x_j + a_i + a_j`` in the default model, which for points in the plane
-    are minus half their squared distance. Classical scaling (Isomap) is the limit of wide kernels; narrower ones let
-    distant pairs go and keep neighbours.
+    are minus half their squared distance. Wide kernels weigh all pairs alike, and the result is next to that of
+    classical scaling (Isomap); narrower ones let distant pairs go and keep neighbours.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
     relaxation : float, default=1.6
         Relaxation ω of a step, inside (0, 2).
 
-    max_sweeps : int, default=1000
+    max_sweeps : int, default=500
         Most passes over all landmarks. A fit that uses them up warns.
 
     tolerance : float, default=1e-5
@@ -174,8 +174,9 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
     radius of a round cloud in the plane. Where points lie in ``n_components`` dimensions every width finds them. Where
     they do not (curved surfaces, noise, more dimensions) a wide kernel serves all distances alike, far ones of which
     there are most, and which a graph measures worst; a narrow one keeps neighbours, as trustworthiness and continuity
-    measure, at hardly less correlation of all distances. Narrower than 0.03 the pieces of the data lose sight of each
-    other, and the fit takes hundreds of sweeps.
+    measure, at hardly less correlation of all distances. Below 0.03 a fit takes hundreds of sweeps more for little,
+    and from a random start folds are likely to stay. Of points far from all others the likelihood says little more than
+    that, and serial sweeps move them slowly.
 
     `transform` places each point by itself, by the likelihood of its affinities to the landmarks, which is concave; the
     landmarks stay. A point that coincides with a landmark is put where that is, so that the training data are placed
@@ -214,7 +215,7 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
         kernel_width: float | None = None,
         mean_affinity: float | None = None,
         relaxation: float = 1.6,
-        max_sweeps: int = 1000,
+        max_sweeps: int = 500,
         tolerance: float = 1e-5,
         update: Literal["serial", "parallel"] = "serial",
         initial: Any = "mds",
@@ -462,7 +463,7 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
                 raise ValueError("all points coincide, or are too close together for the squares of their distances")
             self.sigma_ = self._kernel_width(own, mean_squared)
             if self.model != "isomap":
-                options["kernel_width"] = self.sigma_ / mean_squared
+                options["sigma"] = self.sigma_
         if self.model != "isomap":
             options |= {
                 "relaxation": float(self.relaxation),
