@@ -12,7 +12,7 @@ WHEELS := addon/wheels
 # What the wheel is made of. Official Blender runs on glibc 2.28, which zig links against on any newer system.
 NATIVE := Cargo.toml Cargo.lock $(shell find native -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' 2>/dev/null)
 
-.PHONY: test test-rust test-python test-blender lint format venv wheel zip demo paper clean
+.PHONY: test test-rust test-python test-blender bench lint format venv wheel zip demo paper clean
 
 test: test-rust lint test-python test-blender
 
@@ -21,6 +21,10 @@ test-rust:
 	$(CARGO) clippy --workspace --all-targets --locked -- -D warnings
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --workspace --no-deps --locked --document-private-items
 	$(CARGO) test --locked
+
+# Figures and what they mean: native/ble_unwrap_core/benches/README.md. BENCH=embedding/face/1000 runs one.
+bench:
+	$(CARGO) bench --locked -p ble_unwrap_core --bench main -- $(BENCH)
 
 test-python: $(VENV)/.wheel
 	$(BIN)/python -m pytest tests --ignore=tests/blender

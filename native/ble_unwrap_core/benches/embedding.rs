@@ -5,7 +5,7 @@ use ble_unwrap_core::embedding::{
     EmbedInput, EmbedOptions, Embedding, EmbeddingSettings, KernelWidth, Model, PointMetric, embed,
 };
 use criterion::{BenchmarkId, Criterion, Throughput};
-use rayon::ThreadPoolBuilder;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::hint::black_box;
 use std::time::Duration;
 
@@ -15,19 +15,26 @@ use crate::surfaces;
 const LANDMARKS: usize = 100;
 
 /// All on one thread, as the paper's figures are, but for the last group.
-pub fn benches(criterion: &mut Criterion) {
-    let one = ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
-    one.install(|| {
-        all_pairs(criterion);
-        landmarks(criterion);
-        truncation(criterion);
-        dimensions(criterion);
-    });
+pub(crate) fn benches(criterion: &mut Criterion) {
+    let one = pool(1);
+    all_pairs(criterion, &one);
+    landmarks(criterion, &one);
+    truncation(criterion, &one);
+    dimensions(criterion, &one);
     threads(criterion);
 }
 
-fn run(input: EmbedInput<'_>, options: &EmbedOptions<'_>, settings: &EmbeddingSettings) -> Embedding {
-    embed(input, options, settings, &Progress::new()).expect("valid input")
+fn pool(threads: usize) -> ThreadPool {
+    ThreadPoolBuilder::new().num_threads(threads).build().expect("threads")
+}
+
+fn run(
+    pool: &ThreadPool,
+    input: EmbedInput<'_>,
+    options: &EmbedOptions<'_>,
+    settings: &EmbeddingSettings,
+) -> Embedding {
+    pool.install(|| embed(input, options, settings, &Progress::new())).expect("valid input")
 }
 
 fn points(data: &[f64], metric: PointMetric) -> EmbedInput<'_> {
@@ -49,7 +56,7 @@ fn misfit(found: &Embedding, data: &[f64], n: usize) -> f64 {
 
 /// All vertices of a face-like surface at once, from the matrix of their geodesic distances: kernel width, affinities,
 /// classical scaling and sweeps.
-fn all_pairs(criterion: &mut Criterion) {
+fn all_pairs(criterion: &mut Criterion, one: &ThreadPool) {
     let mut group = criterion.benchmark_group("embedding");
     group.sample_size(10).measurement_time(Duration::from_secs(3)).warm_up_time(Duration::from_millis(500));
     // The paper's face has "around 1,000 vertices": 32² = 1,024 here. Otherwise fourfold.
@@ -66,14 +73,14 @@ fn all_pairs(criterion: &mut Criterion) {
             ),
         ];
         for (case, settings) in cases {
-            let found = run(input, &EmbedOptions::default(), &settings);
+            let found = run(one, input, &EmbedOptions::default(), &settings);
             let error = misfit(&found, &distances, n);
             // The printed model folds and has no scale; its likelihood must have grown.
-            let gained = found.trace.first().zip(found.log_likelihood).is_none_or(|(start, end)| end > start);
+            let gained = found.trace.first().zip(found.log_likelihood).is_none_or(|(start, end)| end > *start);
             assert!(gained && (case == "face_paper_10_sweeps" || error < 0.1), "{case} {n}: {error}");
             group.throughput(Throughput::Elements(n as u64));
             group.bench_function(BenchmarkId::new(case, name), |bencher| {
-                bencher.iter(|| run(black_box(input), &EmbedOptions::default(), &settings));
+                bencher.iter(|| run(one, black_box(input), &EmbedOptions::default(), &settings));
             });
         }
     }
@@ -81,7 +88,7 @@ fn all_pairs(criterion: &mut Criterion) {
 }
 
 /// Points of a rolled sheet by 100 landmarks: time grows with their number, straight and along the graph.
-fn landmarks(criterion: &mut Criterion) {
+fn landmarks(criterion: &mut Criterion, one: &ThreadPool) {
     let mut group = criterion.benchmark_group("embedding");
     group.sample_size(10).measurement_time(Duration::from_secs(2)).warm_up_time(Duration::from_millis(100));
     let options = EmbedOptions { landmarks: Some(LANDMARKS), ..EmbedOptions::default() };
@@ -94,12 +101,12 @@ fn landmarks(criterion: &mut Criterion) {
                 continue;
             }
             let input = points(&data, metric);
-            let found = run(input, &options, &settings);
+            let found = run(one, input, &options, &settings);
             assert_eq!((found.landmarks.len(), found.coordinates.len()), (LANDMARKS, 2 * n));
             assert!(found.converged && found.coordinates.iter().all(|c| c.is_finite()));
             group.throughput(Throughput::Elements(n as u64));
             group.bench_function(BenchmarkId::new(case, n), |bencher| {
-                bencher.iter(|| run(black_box(input), &options, &settings));
+                bencher.iter(|| run(one, black_box(input), &options, &settings));
             });
         }
     }
@@ -107,7 +114,7 @@ fn landmarks(criterion: &mut Criterion) {
 }
 
 /// The whole matrix along a graph, with a kernel so narrow that most of it need not be measured.
-fn truncation(criterion: &mut Criterion) {
+fn truncation(criterion: &mut Criterion, one: &ThreadPool) {
     let mut group = criterion.benchmark_group("embedding");
     group.sample_size(10).measurement_time(Duration::from_secs(2)).warm_up_time(Duration::from_millis(100));
     let data = surfaces::roll(4_000);
@@ -117,18 +124,18 @@ fn truncation(criterion: &mut Criterion) {
     for (case, truncation) in [("roll_all_distances", 0.0), ("roll_truncated", 0.01)] {
         let width = Some(KernelWidth::Absolute(2.0));
         let options = EmbedOptions { truncation, width, ..EmbedOptions::default() };
-        let found = run(input, &options, &settings);
+        let found = run(one, input, &options, &settings);
         assert!(found.coordinates.iter().all(|c| c.is_finite()));
         group.throughput(Throughput::Elements(4_000));
         group.bench_function(BenchmarkId::new(case, 4_000), |bencher| {
-            bencher.iter(|| run(black_box(input), &options, &settings));
+            bencher.iter(|| run(one, black_box(input), &options, &settings));
         });
     }
     group.finish();
 }
 
 /// Other output dimensions, and a degenerate case: points in four places only.
-fn dimensions(criterion: &mut Criterion) {
+fn dimensions(criterion: &mut Criterion, one: &ThreadPool) {
     let mut group = criterion.benchmark_group("embedding");
     group.sample_size(10).measurement_time(Duration::from_secs(2)).warm_up_time(Duration::from_millis(100));
     let data = surfaces::roll(1_000);
@@ -136,17 +143,17 @@ fn dimensions(criterion: &mut Criterion) {
     for dimensions in [1, 2, 3, 8] {
         let options = EmbedOptions { dimensions, ..EmbedOptions::default() };
         let input = points(&data, PointMetric::Euclidean);
-        assert_eq!(run(input, &options, &settings).coordinates.len(), 1_000 * dimensions);
+        assert_eq!(run(one, input, &options, &settings).coordinates.len(), 1_000 * dimensions);
         group.bench_function(BenchmarkId::new(format!("roll_q{dimensions}"), 1_000), |bencher| {
-            bencher.iter(|| run(black_box(input), &options, &settings));
+            bencher.iter(|| run(one, black_box(input), &options, &settings));
         });
     }
     let few: Vec<f64> = (0..1_000).flat_map(|i| [f64::from(i % 2), f64::from(i / 2 % 2), 0.0]).collect();
     let input = points(&few, PointMetric::Euclidean);
-    let found = run(input, &EmbedOptions::default(), &settings);
+    let found = run(one, input, &EmbedOptions::default(), &settings);
     assert!(found.bregman.is_some_and(|b| b.abs() < 1e-6), "four points of the plane are reproduced");
     group.bench_function(BenchmarkId::new("four_places", 1_000), |bencher| {
-        bencher.iter(|| run(black_box(input), &EmbedOptions::default(), &settings));
+        bencher.iter(|| run(one, black_box(input), &EmbedOptions::default(), &settings));
     });
     group.finish();
 }
@@ -161,12 +168,12 @@ fn threads(criterion: &mut Criterion) {
     let settings = EmbeddingSettings::default();
     let mut first = None;
     for threads in [1, 2] {
-        let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        let found = pool.install(|| run(input, &options, &settings)).coordinates;
+        let pool = pool(threads);
+        let found = run(&pool, input, &options, &settings).coordinates;
         assert_eq!(first.get_or_insert_with(|| found.clone()), &found);
         group.throughput(Throughput::Elements(64_000));
         group.bench_function(BenchmarkId::new(format!("roll_{threads}_threads"), 64_000), |bencher| {
-            pool.install(|| bencher.iter(|| run(black_box(input), &options, &settings)));
+            bencher.iter(|| run(&pool, black_box(input), &options, &settings));
         });
     }
     group.finish();

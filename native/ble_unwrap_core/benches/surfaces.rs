@@ -6,7 +6,7 @@ use ble_unwrap_core::mesh::TriMesh;
 
 /// A face-like surface of `side`² vertices: an oval bulge with nose, brows and eye sockets. About the relief of a
 /// scanned face, over one unit of width.
-pub fn face(side: usize) -> TriMesh {
+pub(crate) fn face(side: usize) -> TriMesh {
     let bump = |x: f64, y: f64, at: [f64; 2], size: [f64; 2], height: f64| {
         height * (-((x - at[0]) / size[0]).powi(2) - ((y - at[1]) / size[1]).powi(2)).exp()
     };
@@ -37,14 +37,14 @@ pub fn face(side: usize) -> TriMesh {
 }
 
 /// Geodesic distances of all pairs of vertices, row by row.
-pub fn distances(mesh: &TriMesh) -> Vec<f64> {
+pub(crate) fn distances(mesh: &TriMesh) -> Vec<f64> {
     let all: Vec<_> = mesh.vertices().collect();
     let rows = geodesic_distances(mesh, &all, Metric::FastMarching, &Progress::new()).expect("not cancelled");
     rows.into_rows().into_iter().map(f64::from).collect()
 }
 
 /// A sheet rolled up in space, n×3, evenly strewn.
-pub fn roll(n: usize) -> Vec<f64> {
+pub(crate) fn roll(n: usize) -> Vec<f64> {
     (0..n)
         .flat_map(|i| {
             let (u, v) = ((i as f64 * 0.618_033_988_749_894_9).fract(), (i as f64 + 0.5) / n as f64);

@@ -176,10 +176,12 @@ impl Task<'_> {
         let n = source.len();
         let points: Vec<usize> = (0..n).collect();
         let isomap = self.settings.model == Model::Isomap;
-        if !isomap && n > START_LANDMARKS && self.options.truncation > 0.0 {
-            if let Some(fitted) = self.truncated(source)? {
-                return self.fit(source, fitted);
-            }
+        if !isomap
+            && n > START_LANDMARKS
+            && self.options.truncation > 0.0
+            && let Some(fitted) = self.truncated(source)?
+        {
+            return self.fit(source, fitted);
         }
         let mut matrix = source.matrix(self.progress)?;
         if isomap {
@@ -208,7 +210,7 @@ impl Task<'_> {
             Affinity::from_matrix(&among, points.len())?.truncated(self.options.truncation)
         } else {
             let width = source.landmark_width(&points, &reference, &among, self.kernel, self.width, self.progress)?;
-            self.from_distances(&among, points.len(), KernelWidth::Absolute(width))?
+            self.affinity_of_distances(&among, points.len(), KernelWidth::Absolute(width))?
         };
         let start =
             self.start(&points, &affinity, Some(among).filter(|_| source.evidence() != Evidence::Affinities))?;
@@ -259,11 +261,11 @@ impl Task<'_> {
     fn affinity(&self, source: &Source<'_>, matrix: &[f64], n: usize) -> Result<Affinity, EmbeddingError> {
         match source.evidence() {
             Evidence::Affinities => Ok(Affinity::from_matrix(matrix, n)?.truncated(self.options.truncation)),
-            Evidence::SquaredDistances => self.from_distances(matrix, n, self.width),
+            Evidence::SquaredDistances => self.affinity_of_distances(matrix, n, self.width),
         }
     }
 
-    fn from_distances(&self, squared: &[f64], n: usize, width: KernelWidth) -> Result<Affinity, EmbeddingError> {
+    fn affinity_of_distances(&self, squared: &[f64], n: usize, width: KernelWidth) -> Result<Affinity, EmbeddingError> {
         let affinity = Affinity::from_squared_distances(squared, n, self.kernel, width, self.progress)?;
         Ok(if self.options.truncation > 0.0 { affinity.truncated(self.options.truncation) } else { affinity })
     }
