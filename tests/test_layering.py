@@ -226,13 +226,17 @@ def tops(names: set[str]) -> set[str]:
 
 # File of the add-on -> what it never imports.
 NEVER = {
-    "mesh_bridge.py": {".engine", "ble_unwrap_native"},
+    "mesh_bridge.py": {".engine", ".cloud_bridge", "ble_unwrap_native"},
+    "cloud_bridge.py": {".engine", "ble_unwrap_native"},
+    "point_file.py": {"bpy", "bmesh", ".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "targets.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "cloud_report.py": {"bpy", "bmesh", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
     "operators": {"ble_unwrap_native"},
-    "panel.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
-    "menu.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
-    "preferences.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
-    "properties.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
-    "engine.py": {"bpy", "bmesh", ".mesh_bridge", ".operators", ".properties"},
+    "panel.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "menu.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "preferences.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "properties.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "engine.py": {"bpy", "bmesh", ".mesh_bridge", ".cloud_bridge", ".operators", ".properties"},
 }
 
 
@@ -249,6 +253,28 @@ def test_python_layers(file):
         allowed = {"bpy", "bmesh", "mathutils", "numpy", "addon_utils", "bl_ext", "gpu", "ble_unwrap_native"}
         foreign = {n for n in names if not n.startswith(".")} - allowed - set(sys.stdlib_module_names)
         assert not foreign, "an extension has only Blender's Python; its own modules are imported relatively"
+
+
+PACKAGE = ROOT / "native/ble_unwrap_native/python/ble_unwrap_native"
+# Module of the Python package around the native one -> what it may import besides the standard library. Blender's
+# Python has no scikit-learn, and the package shall load where there is no NumPy either.
+PACKAGE_MAY_IMPORT = {
+    "__init__.py": {"._native"},
+    "estimator.py": {".", "._placement", "joblib", "numpy", "scipy", "sklearn"},
+    "_placement.py": {"numpy"},
+}
+
+
+@pytest.mark.parametrize("file", sorted(PACKAGE.glob("*.py")), ids=lambda f: f.name)
+def test_package_layers(file):
+    assert file.name in PACKAGE_MAY_IMPORT, "the module is not in the table of layers"
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), str(file))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found.add("." * node.level + (node.module or "") if node.level else node.module.split(".")[0])
+    assert found - set(sys.stdlib_module_names) <= PACKAGE_MAY_IMPORT[file.name]
 
 
 # The test itself ----------------------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ mod cloud;
 mod distances;
 mod embed;
 mod errors;
+mod flatten;
 mod job;
 mod measure;
 mod owned_array;
@@ -24,9 +25,11 @@ mod native {
     #[pymodule_export]
     use crate::cloud::{PointAtlas, submit_unwrap_points, unwrap_points};
     #[pymodule_export]
-    use crate::distances::geodesic_distances;
+    use crate::distances::{geodesic_distances, graph_distances};
     #[pymodule_export]
     use crate::embed::{Embedding, embed};
+    #[pymodule_export]
+    use crate::flatten::{Flattening, flatten};
     #[pymodule_export]
     use crate::job::Job;
     #[pymodule_export]

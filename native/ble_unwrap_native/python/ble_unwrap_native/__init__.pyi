@@ -11,6 +11,7 @@ __all__ = [
     "BleUnwrapError",
     "Cancelled",
     "Embedding",
+    "Flattening",
     "InternalError",
     "InvalidArgumentError",
     "InvalidMeshError",
@@ -20,7 +21,9 @@ __all__ = [
     "__version__",
     "default_settings",
     "embed",
+    "flatten",
     "geodesic_distances",
+    "graph_distances",
     "measure",
     "pack",
     "submit_unwrap",
@@ -39,7 +42,7 @@ class InternalError(BleUnwrapError): ...
 
 @type_check_only
 class _Threads(TypedDict, total=False):
-    preset: Literal["default", "paper"]
+    preset: Literal["default", "paper", "iso_charts"]
     threads: int
 
 @type_check_only
@@ -47,7 +50,7 @@ class _GeodesicSettings(_Threads, total=False):
     geodesics: Literal["fast_marching", "dijkstra"]
 
 @type_check_only
-class _EmbeddingSettings(_Threads, total=False):
+class _FitSettings(_Threads, total=False):
     seed: int
     model: Literal["default", "paper", "isomap"]
     kernel_width: float | None
@@ -55,6 +58,9 @@ class _EmbeddingSettings(_Threads, total=False):
     max_sweeps: int
     tolerance: float
     update: Literal["serial", "parallel"]
+
+@type_check_only
+class _EmbeddingSettings(_FitSettings, total=False):
     initial: Literal["mds", "random"]
 
 @type_check_only
@@ -75,18 +81,22 @@ class _CloudSettings(_EmbeddingSettings, _PackSettings, total=False):
     landmark_max: int | None
 
 @type_check_only
-class _Settings(_GeodesicSettings, _EmbeddingSettings, _PackSettings, total=False):
-    stretch_limit: float
+class _FlattenSettings(_GeodesicSettings, _EmbeddingSettings, total=False):
     weld: bool
+    landmark_fraction: float
+    landmark_min: int
+    landmark_max: int | None
+    together_max: int
+    stretch_solver: Literal["newton", "line_search"]
+    stretch_iterations: int
+
+@type_check_only
+class _Settings(_FlattenSettings, _PackSettings, total=False):
+    stretch_limit: float
     coarse: bool
     merge: bool
     holes: Literal["keep", "cut"]
     chart_scale: Literal["uniform", "stretch"]
-    landmark_fraction: float
-    landmark_min: int
-    landmark_max: int | None
-    stretch_solver: Literal["newton", "line_search"]
-    stretch_iterations: int
 
 @final
 class Array(Buffer):
@@ -113,6 +123,16 @@ class Embedding:
     def coordinates(self) -> Array: ...
     @property
     def intercepts(self) -> Array: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
+    def transform(self, data: Buffer, *, job: Job | None = None, **settings: Unpack[_Threads]) -> Array: ...
+
+@final
+class Flattening:
+    @property
+    def embedded(self) -> Array: ...
+    @property
+    def uv(self) -> Array: ...
     @property
     def report(self) -> dict[str, Any]: ...
 
@@ -183,9 +203,26 @@ def embed(
     *,
     kind: Literal["points", "distances", "affinities"] = "points",
     dimensions: int = 2,
+    metric: Literal["euclidean", "geodesic"] = "euclidean",
+    neighbours: int = 12,
+    landmarks: int | None = None,
+    initial: Literal["mds", "random"] | Buffer | None = None,
+    mean_affinity: float | None = None,
+    sigma: float | None = None,
+    truncation: float = 0.0,
     job: Job | None = None,
-    **settings: Unpack[_EmbeddingSettings],
+    **settings: Unpack[_FitSettings],
 ) -> Embedding: ...
+def flatten(
+    positions: Buffer,
+    corner_vertices: Buffer,
+    face_offsets: Buffer,
+    *,
+    corner_triangles: Buffer | None = None,
+    minimise: bool = True,
+    job: Job | None = None,
+    **settings: Unpack[_FlattenSettings],
+) -> Flattening: ...
 def geodesic_distances(
     positions: Buffer,
     corner_vertices: Buffer,
@@ -195,6 +232,16 @@ def geodesic_distances(
     corner_triangles: Buffer | None = None,
     job: Job | None = None,
     **settings: Unpack[_GeodesicSettings],
+) -> Array: ...
+def graph_distances(
+    points: Buffer,
+    sources: Buffer | None = None,
+    *,
+    neighbours: int = 12,
+    connect: Literal["error", "bridge", "separate"] = "error",
+    radius: float | None = None,
+    job: Job | None = None,
+    **settings: Unpack[_Threads],
 ) -> Array: ...
 def measure(
     positions: Buffer,
@@ -215,4 +262,4 @@ def pack(
     job: Job | None = None,
     **settings: Unpack[_PackSettings],
 ) -> PackedCharts: ...
-def default_settings(preset: Literal["default", "paper"] = "default") -> dict[str, Any]: ...
+def default_settings(preset: Literal["default", "paper", "iso_charts"] = "default") -> dict[str, Any]: ...
