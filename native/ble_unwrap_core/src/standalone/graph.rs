@@ -256,7 +256,11 @@ mod tests {
         points
     }
 
-    fn distances(points: &[f64], sources: Option<&[i32]>, settings: &CloudDistanceSettings) -> Result<Vec<f64>, CloudDistancesError> {
+    fn distances(
+        points: &[f64],
+        sources: Option<&[i32]>,
+        settings: &CloudDistanceSettings,
+    ) -> Result<Vec<f64>, CloudDistancesError> {
         cloud_distances(points, 4, sources, settings, &Progress::new())
     }
 
