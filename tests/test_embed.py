@@ -69,7 +69,7 @@ def test_the_printed_model_from_affinities():
 def test_the_likelihood_never_falls(model, update):
     affinity = np.random.default_rng(6).random((50, 50))
     for relaxation in (0.5, 1.0, 1.5, 1.9):
-        options = {"model": model, "update": update, "relaxation": relaxation, "initial": "random", "tolerance": 0.0}
+        options = {"model": model, "update": update, "relaxation": relaxation, "initial": "random", "tolerance": 1e-15}
         report = native.embed(affinity, kind="affinities", **options).report
         trace = np.array(report["trace"])
         assert (np.diff(trace) >= -1e-9 * np.abs(trace[1:])).all(), relaxation
@@ -163,7 +163,8 @@ def test_the_same_bytes_for_any_number_of_threads(options):
     points, _ = roll(600)
     results = [native.embed(points, threads=threads, **options) for threads in (1, 2, 8)]
     assert len({bytes(r.coordinates) for r in results}) == 1
-    assert len({bytes(r.transform(points[:100] + 0.01, threads=t)) for r, t in zip(results, (1, 2, 8))}) == 1
+    placed = {bytes(results[0].transform(points[:100] + 0.01, threads=threads)) for threads in (1, 2, 8)}
+    assert len(placed) == 1
 
 
 # Wrong input --------------------------------------------------------------------------------------------------------
@@ -185,7 +186,11 @@ APART = np.vstack([CLOUD, CLOUD + 100])
         (CLOUD, {"dimensions": -1}, "dimensions: expected a whole number from 1 to"),
         (NAN, {}, "component 1 of point 5 is not finite"),
         (NEGATIVE, {"kind": "distances"}, "from point 0 to point 3 is -.*must be finite and not negative"),
-        (INFINITE, {"kind": "distances"}, "the distance from point 0 to point 8 is inf"),
+        (
+            INFINITE,
+            {"kind": "distances"},
+            "point 0 to point 1 is inf.*no path between them are embedded each by itself",
+        ),
         (2 * distances_of(CLOUD), {"kind": "affinities"}, "the affinity of points .* must lie between 0 and 1"),
         (np.zeros((9, 2)), {}, "all points lie at distance zero"),
         (APART, {"metric": "geodesic"}, "falls into 2 pieces, the largest of 20"),
@@ -199,7 +204,7 @@ APART = np.vstack([CLOUD, CLOUD + 100])
         (CLOUD, {"sigma": 1.0, "kernel_width": 0.2}, "at most one of kernel_width, mean_affinity and sigma"),
         (CLOUD, {"truncation": 1.5}, "truncation is 1.5"),
         (CLOUD, {"truncation": "all"}, "truncation: expected a number"),
-        (CLOUD, {"landmarks": 2}, "2 .*landmarks|landmarks"),
+        (CLOUD, {"landmarks": 2}, "2 points do not span 2 dimensions"),
         (CLOUD, {"initial": np.zeros((20, 3))}, r"initial: expected shape \(20, 2\), a row for each point"),
         (CLOUD, {"initial": np.full((20, 2), np.nan)}, "not finite"),
         (CLOUD, {"initial": "pca"}, "initial: expected 'mds' or 'random'"),

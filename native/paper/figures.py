@@ -225,7 +225,8 @@ def figure_scaling(surfaces, points, likelihoods, path):
     left.set_ylabel("seconds")
     left.set_title("time, fixed number of landmarks")
     left.grid(alpha=0.3)
-    left.legend(frameon=False)
+    left.set_ylim(bottom=embedding.min() / 40)  # room for the legend below the curves
+    left.legend(frameon=False, loc="lower right")
     shades = ["#9ecae1", "#6baed6", "#3182bd", "#08519c", "#fdae6b", "#d94801"]
     for axes, model in zip(right, ("default", "paper"), strict=True):
         mine = {label: values for (of, label), values in likelihoods.items() if of == model}

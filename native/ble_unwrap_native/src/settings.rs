@@ -142,6 +142,7 @@ const PACK: &[Function] = &[Function::Pack, Function::UnwrapPoints];
 const TEXTURE: &[Function] = &[Function::Measure, Function::Pack, Function::UnwrapPoints];
 const ALL: &[Function] = &[
     Function::Embed,
+    Function::Transform,
     Function::Flatten,
     Function::GeodesicDistances,
     Function::GraphDistances,

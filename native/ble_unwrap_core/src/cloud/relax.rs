@@ -24,8 +24,10 @@ use super::local_map::Offsets;
 const RIGID_STEPS: usize = 12;
 /// Most steps of the second kind.
 const DIRICHLET_STEPS: usize = 12;
-/// A step that lowers the energy by a smaller share of it is the last.
-const LEAST_GAIN: f64 = 1e-4;
+/// A step that lowers the energy above that of an isometry by a smaller share of it is the last.
+const LEAST_GAIN: f64 = 1e-2;
+/// Weight of what is not affine in a neighbourhood: the curvature of the energy at an isometry, as in its proxy.
+const SMOOTHNESS: f64 = 4.0;
 /// Most halvings of a step of the second kind.
 const MOST_HALVINGS: usize = 8;
 /// Weight by which one node is held where it is, over its diagonal entry: the energy leaves the place open.
@@ -122,6 +124,7 @@ impl Spokes<'_> {
             return Ok(());
         }
         let Ok(mut system) = SparseCholesky::analyse(self.pattern().with_blocks_of_two()) else { return Ok(()) };
+        let floor = 4.0 * area.iter().sum::<f64>();
         let blocks = BlockPlaces::new(self.offsets, system.pattern());
         for _ in 0..DIRICHLET_STEPS {
             progress.check()?;
@@ -148,7 +151,8 @@ impl Spokes<'_> {
             *uv = moved;
             let gain = energy - there;
             energy = there;
-            if gain < LEAST_GAIN * energy {
+            // An isometry has energy 4 an area.
+            if gain < LEAST_GAIN * (energy - floor).max(LEAST_GAIN * floor) {
                 break;
             }
         }
@@ -174,7 +178,8 @@ impl Spokes<'_> {
         if length > 0.0 { Vector2::new(dot, cross) / length } else { Vector2::x() }
     }
 
-    /// Σ a (|J|² + |J⁻¹|²), infinite if a node is folded.
+    /// Σ a (|J|² + |J⁻¹|²) + 4 Σ w |image − J x|², infinite if a node is folded. The second sum holds against
+    /// maps that waver from node to node, which the Jacobians, being means, do not see.
     fn dirichlet(&self, area: &[f64], uv: &[Point2<f64>]) -> f64 {
         let local: Vec<f64> = (0..self.offsets.len())
             .into_par_iter()
@@ -183,7 +188,9 @@ impl Spokes<'_> {
                 None => 0.0,
                 Some(j) => {
                     let det = j.determinant();
-                    if det > 0.0 { area[i] * j.norm_squared() * (1.0 + 1.0 / (det * det)) } else { f64::INFINITY }
+                    let rough: f64 = self.offsets.around(i).map(|(k, x)| (uv[k] - uv[i] - j * x).norm_squared()).sum();
+                    let smooth = area[i] * j.norm_squared() * (1.0 + 1.0 / (det * det));
+                    if det > 0.0 { smooth + SMOOTHNESS * self.weight[i] * rough } else { f64::INFINITY }
                 }
             })
             .collect();

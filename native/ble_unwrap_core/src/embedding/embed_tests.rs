@@ -471,7 +471,7 @@ fn separate_pieces_are_counted() {
     let data: Vec<f64> = (0..30).flat_map(|i| [f64::from(i % 10), 100.0 * f64::from(i / 10)]).collect();
     let input =
         |neighbours| EmbedInput::Points { n: 30, p: 2, data: &data, metric: PointMetric::Geodesic { neighbours } };
-    let found = run(input(3), &with(2), &EmbeddingSettings::default()).err().expect("three rows");
+    let found = run(input(3), &with(2), &EmbeddingSettings::default()).expect_err("three rows");
     assert_eq!(
         found,
         EmbeddingError::Disconnected { neighbours: 3, pieces: 3, points: 30, largest: 10, enough: Some(10) }
