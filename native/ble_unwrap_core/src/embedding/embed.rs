@@ -1,10 +1,10 @@
 //! The method in general: points, distances or affinities in, points of any dimension out.
 //!
-//! 1. [`EmbedInput`] is checked; points with geodesic distances get their graph ([`PointMetric`]).
+//! 1. [`EmbedInput`] is checked; points with geodesic distances get their graph ([`PointMetric`](super::PointMetric)).
 //! 2. All points, or landmarks in farthest-point order, get affinities (5, 13) with a kernel of width σ.
 //! 3. Classical scaling, random numbers or given coordinates are the start; [`fit`] does the rest. Of many points the
 //!    scaling is that of landmarks, which the default model fits first.
-//! 4. Every other point is placed by logistic regression on the landmarks ([`LandmarkModel`](super::LandmarkModel)).
+//! 4. Every other point is placed by logistic regression on the landmarks ([`LandmarkModel`]).
 //!
 //! [`Model::Isomap`] takes the same distances and stops at classical scaling.
 

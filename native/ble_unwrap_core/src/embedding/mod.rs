@@ -15,7 +15,7 @@
 //! The result may have flips (few with the default model, many with the printed one); removing
 //! them is the next stage's.
 //!
-//! The same method for points, distances or affinities of any kind in any dimension: [`embed`].
+//! The same method for points, distances or affinities of any kind in any dimension: [`embed()`].
 //!
 //! # References
 //! Bernoulli embedding model and its application in texture mapping, 2006 ("the paper"), sections
