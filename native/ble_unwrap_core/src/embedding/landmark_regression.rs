@@ -21,6 +21,9 @@ use super::logistic::{Exact, PlanarPoints, RowSums, logistic_pair, pair_log_like
 
 /// Most evaluations a point; three or four are usual. A point that uses them all keeps its best place.
 const MOST_EVALUATIONS: usize = 24;
+/// The same of an anchored point, whose least squares may be far off: where distances are of many dimensions and the
+/// kernel is narrow, steps are halved often.
+const MOST_EVALUATIONS_ANCHORED: usize = 100;
 /// A Newton step shorter than this is the last: the next would be of its square, 1e-10 in units of √σ.
 const LAST_STEP: f64 = 1e-5;
 /// Weight of an anchored point's place by least squares against its likelihood. A pair of affinity ½ weighs ¼: this
@@ -298,7 +301,7 @@ fn climb<R: Regression>(
     next.resize(theta.len(), 0.0);
     let mut best = R::log_likelihood(sums);
     regression.solve(sums, step);
-    for _ in 0..MOST_EVALUATIONS {
+    for _ in 0..if prior > 0.0 { MOST_EVALUATIONS_ANCHORED } else { MOST_EVALUATIONS } {
         for (next, (theta, step)) in next.iter_mut().zip(theta.iter().zip(step.iter())) {
             *next = theta + step;
         }

@@ -501,8 +501,8 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
         least = self._most() * _mean_over_pairs(own == 0)
         if not least < target < self._most():
             raise ValueError(
-                f"mean_affinity == {target}: no kernel width has it; it must be above {least} and below the affinity at "
-                f"distance 0, {self._most()}"
+                f"mean_affinity == {target}: no kernel width has it; it must be above {least} and below the affinity "
+                f"at distance 0, {self._most()}"
             )
         # The compiled fit chooses σ; one sweep, for a start may have to be scaled by σ before the fit that counts.
         options: dict[str, Any] = {"initial": "random", "max_sweeps": 1, "threads": effective_n_jobs(self.n_jobs)}
@@ -532,10 +532,12 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
             options["mean_squared"] = self._mean_squared
         else:
             options |= {"sigma": self.sigma_, "truncation": float(self.truncation)}
-        kind = "affinities" if self.metric == "precomputed_affinity" else "distances"
+        if self.metric == "precomputed_affinity":
+            options["kind"] = "affinities"
         landmarks: Bytes = self._landmarks
+        intercepts: Bytes = self.intercepts_
         try:
-            return np.asarray(place(known, landmarks, self.intercepts_, kind=kind, **options)).copy()
+            return np.array(place(known, landmarks, intercepts, **options))
         except InvalidArgumentError as error:
             raise ValueError(str(error)) from error
 
