@@ -175,7 +175,7 @@ def test_core_neither_prints_nor_opens_files():
 @pytest.mark.parametrize(
     ("crate", "allowed"),
     [
-        ("ble_unwrap_core", {"faer", "nalgebra", "rayon", "robust", "thiserror"}),
+        ("ble_unwrap_core", {"faer", "nalgebra", "pulp", "rayon", "robust", "thiserror"}),
         ("ble_unwrap_fixtures", {"toml", "serde"}),
         ("ble_unwrap_native", {"ble_unwrap_core", "pyo3", "rayon"}),
     ],

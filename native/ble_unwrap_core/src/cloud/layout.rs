@@ -83,7 +83,9 @@ pub(super) fn lay_out(
     for (place, &i) in specks.iter().enumerate() {
         let (centre, scale) = (rows.centre(place), SPECK_FILL * SPECK_TEXELS / extents[i]);
         let middle = middle(&charts[i].uv);
-        let at = |p: &Point2<f64>| single(centre + if extents[i] > 0.0 { (p - middle) * scale } else { p - p });
+        let at = |p: &Point2<f64>| {
+            single(centre + if extents[i] > 0.0 { (p - middle) * scale } else { nalgebra::Vector2::zeros() })
+        };
         uv[i] = charts[i].uv.iter().map(at).collect();
     }
     let share = f64::from(settings.height - rows.height) / height;

@@ -26,7 +26,7 @@ pub(super) fn overlapping_pairs(
     group: impl Fn(usize) -> u32 + Sync,
 ) -> Vec<(u32, u32)> {
     let mut sorted: Vec<f64> = spacing.iter().copied().filter(|s| *s > 0.0).collect();
-    if sorted.is_empty() || !(scale > 0.0) {
+    if sorted.is_empty() || scale.is_nan() || scale <= 0.0 {
         return Vec::new();
     }
     let middle = sorted.len() / 2;

@@ -94,7 +94,9 @@ fn by_cells(
     let limit = 1.0 + CELL_ALLOWANCE * (settings.stretch_limit - 1.0);
     let all = vec![(0..count as u32).collect()];
     let mut charting = charting::chart(&cells.sample, all, limit, settings, &done, progress)?;
-    for round in 0.. {
+    // At most `MOST_ROUNDS` times.
+    let mut round = 0;
+    loop {
         let fine = Fine::new(&cells, &sample, &charting.charts, progress)?;
         let bad = fine.bad_charts(&sample, settings.stretch_limit, &charting.charts);
         if bad.is_empty() || round == MOST_ROUNDS {
@@ -127,8 +129,8 @@ fn by_cells(
         kept.extend(again.charts);
         kept.sort_by_key(|c| c.nodes.first().copied());
         charting.charts = kept;
+        round += 1;
     }
-    unreachable!("the loop ends in its last round")
 }
 
 /// The points of a piece placed by its cells.

@@ -2,7 +2,8 @@
 //!
 //! 1. [`EmbedInput`] is checked; points with geodesic distances get their graph ([`PointMetric`]).
 //! 2. All points, or landmarks in farthest-point order, get affinities (5, 13) with a kernel of width σ.
-//! 3. Classical scaling, random numbers or given coordinates are the start; [`fit`] does the rest.
+//! 3. Classical scaling, random numbers or given coordinates are the start; [`fit`] does the rest. Of many points the
+//!    scaling is that of landmarks, which the default model fits first.
 //! 4. Every other point is placed by logistic regression on the landmarks ([`LandmarkModel`](super::LandmarkModel)).
 //!
 //! [`Model::Isomap`] takes the same distances and stops at classical scaling.
@@ -18,7 +19,7 @@ use super::input::EmbedInput;
 use super::landmark_regression::{Evidence, LandmarkModel};
 use super::placement::{Placement, Placer};
 use super::settings::{EmbeddingSettings, Initial, Model};
-use super::source::{Reference, Source};
+use super::source::{Reference, Source, farthest_rows};
 use super::truncated::{Threshold, Truncated, along_graph, between_points};
 
 /// What [`embed()`] takes besides the settings that charts have, too.
@@ -76,6 +77,8 @@ pub struct Embedding {
 
 /// Landmarks that a truncated fit takes its start, and where need be σ, from.
 const START_LANDMARKS: usize = 100;
+/// Above so many points the default model starts from landmarks: below, classical scaling of all costs nothing.
+const STARTED_BY_LANDMARKS: usize = 400;
 /// Relative residual of the eigenpairs that make a start: the fit goes on from there.
 const START_TOLERANCE: f64 = 1e-6;
 /// Relative residual of the eigenpairs that are the result.
@@ -279,10 +282,35 @@ impl Task<'_> {
             Initial::Random => Ok((random_start(points.len(), q, self.options.seed), Vec::new())),
             Initial::Mds => {
                 let squared = squared.unwrap_or_else(|| squared_distances(affinity, self.kernel));
+                if self.settings.model == Model::Default && points.len() > STARTED_BY_LANDMARKS {
+                    return self.landmark_start(&squared, points.len(), affinity.sigma());
+                }
                 let mds = leading_mds(&squared, points.len(), q, START_TOLERANCE, self.progress)?;
                 Ok(mds_start(&mds, affinity.sigma().sqrt(), q))
             }
         }
+    }
+
+    /// The landmarks fitted from their classical scaling, and every other point placed among them: nearer to the end
+    /// than classical scaling of all, for less than a sweep.
+    fn landmark_start(&self, squared: &[f64], n: usize, sigma: f64) -> Result<(Vec<f64>, Vec<f64>), EmbeddingError> {
+        let q = self.options.dimensions;
+        let landmarks = farthest_rows(squared, n, START_LANDMARKS.max(4 * (q + 1)), self.progress)?;
+        let k = landmarks.len();
+        let among: Vec<f64> =
+            landmarks.iter().flat_map(|i| landmarks.iter().map(move |j| squared[i * n + j])).collect();
+        let width = KernelWidth::Absolute(sigma);
+        let affinity = Affinity::from_squared_distances(&among, k, self.kernel, width, self.progress)?;
+        let mds = leading_mds(&among, k, q, START_TOLERANCE, self.progress)?;
+        let (coordinates, intercepts) = mds_start(&mds, sigma.sqrt(), q);
+        let options = self.settings.fit_options();
+        let fit = fit(&affinity, q, &coordinates, &intercepts, &options, self.progress)?;
+        let model = LandmarkModel::new(q, &fit.coordinates, &fit.intercepts, self.kernel, sigma);
+        let observe = |i: usize, row: &mut [f64]| {
+            row.iter_mut().zip(&landmarks).for_each(|(square, l)| *square = squared[i * n + l]);
+        };
+        let placer = Placer::Regression(model);
+        Ok(placer.place(n, q, Evidence::SquaredDistances, observe, self.progress)?)
     }
 
     fn fit(&self, source: &Source<'_>, fitted: Fitted) -> Result<Embedding, EmbeddingError> {

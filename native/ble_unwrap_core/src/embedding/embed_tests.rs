@@ -151,6 +151,26 @@ fn points_of_as_many_dimensions_come_back_exactly_by_landmarks() {
 }
 
 #[test]
+fn a_start_by_landmarks_is_exact_where_scaling_is_and_better_elsewhere() {
+    let shape = rectangle(36, 18, 2.0, 1.0);
+    let data = flat(&shape.points);
+    let found = run(euclidean(&data, 2), &with(2), &EmbeddingSettings::default()).expect("valid");
+    assert!(misfit(&shape.points, &scaled(&found)) < 1e-6 && found.sweeps <= 2);
+
+    let (space, _) = roll(600);
+    let input = EmbedInput::Points { n: 600, p: 3, data: &space, metric: GEODESIC };
+    let found = run(input, &with(2), &EmbeddingSettings::default()).expect("connected");
+    let isomap = EmbeddingSettings { model: Model::Isomap, ..EmbeddingSettings::default() };
+    let scaling = run(input, &with(2), &isomap).expect("connected");
+    let start: Vec<f64> = scaling.coordinates.iter().map(|c| c / found.sigma.sqrt()).collect();
+    let options = EmbedOptions { start: Some(&start), ..with(2) };
+    let other = run(input, &options, &EmbeddingSettings::default()).expect("connected");
+    assert!(found.trace[0] > other.trace[0] && found.sweeps <= other.sweeps, "{:?} {:?}", found.trace, other.trace);
+    let (f, g) = (found.log_likelihood.expect("fitted"), other.log_likelihood.expect("fitted"));
+    assert!((f / g - 1.0).abs() < 1e-4, "the same maximum: {f} {g}");
+}
+
+#[test]
 fn landmarks_lie_far_apart() {
     let data: Vec<f64> = (0..=16).map(f64::from).collect();
     let options = EmbedOptions { landmarks: Some(5), ..with(1) };
@@ -451,7 +471,7 @@ fn separate_pieces_are_counted() {
     let data: Vec<f64> = (0..30).flat_map(|i| [f64::from(i % 10), 100.0 * f64::from(i / 10)]).collect();
     let input =
         |neighbours| EmbedInput::Points { n: 30, p: 2, data: &data, metric: PointMetric::Geodesic { neighbours } };
-    let found = run(input(3), &with(2), &EmbeddingSettings::default()).err().expect("three rows");
+    let found = run(input(3), &with(2), &EmbeddingSettings::default()).expect_err("three rows");
     assert_eq!(
         found,
         EmbeddingError::Disconnected { neighbours: 3, pieces: 3, points: 30, largest: 10, enough: Some(10) }

@@ -119,8 +119,17 @@ const LANES: usize = 4;
 
 /// The sums of the point `theta = (x, y, a)` against `others`, whose affinities to it are `p`.
 ///
-/// One exponential a pair: log(1+e⁻ˢ) is summed as the logarithm of a product of 64. O(n), no allocation.
+/// One exponential a pair: log(1+e⁻ˢ) is summed as the logarithm of a product of 64. O(n), no allocation. Compiled for
+/// the widest registers there are; the bytes are the same for all, since the lanes are fixed and nothing is fused.
 pub(super) fn planar_row<C: Curvature>(p: &[f64], others: PlanarPoints<'_>, theta: [f64; 3]) -> RowSums {
+    pulp::Arch::new().dispatch(
+        #[inline(always)]
+        || row_sums::<C>(p, others, theta),
+    )
+}
+
+#[inline(always)]
+fn row_sums<C: Curvature>(p: &[f64], others: PlanarPoints<'_>, theta: [f64; 3]) -> RowSums {
     let mut sums = RowSums::default();
     let [x0, y0, a0] = theta;
     let blocks = p.chunks(BLOCK).zip(others.x.chunks(BLOCK)).zip(others.y.chunks(BLOCK)).zip(others.a.chunks(BLOCK));

@@ -345,6 +345,28 @@ fn farthest(values: &[f64]) -> Option<(usize, f64)> {
     })
 }
 
+/// At most `count` points in farthest-point order from the squared distances of all pairs, beginning with the point
+/// farthest from point 0.
+pub(super) fn farthest_rows(
+    squared: &[f64],
+    n: usize,
+    count: usize,
+    progress: &Progress,
+) -> Result<Vec<usize>, Cancelled> {
+    let mut chosen = Vec::with_capacity(count);
+    let mut cover = vec![f64::INFINITY; n];
+    let mut next = farthest(&squared[..n]).map(|(v, _)| v);
+    while let Some(landmark) = next.filter(|_| chosen.len() < count) {
+        progress.check()?;
+        chosen.push(landmark);
+        let row = &squared[landmark * n..(landmark + 1) * n];
+        cover.iter_mut().zip(row).for_each(|(cover, d)| *cover = cover.min(*d));
+        cover[landmark] = 0.0;
+        next = farthest(&cover).filter(|(_, d)| *d > 0.0).map(|(v, _)| v);
+    }
+    Ok(chosen)
+}
+
 /// Averages a matrix with its transpose, tile by tile: rows of the one are columns of the other.
 fn symmetrise(matrix: &mut [f64], n: usize) {
     const TILE: usize = 32;

@@ -145,7 +145,7 @@ mod tests {
     fn sums_over_many_coordinates_stop_at_the_radius() {
         // Two tight groups far apart in 256 dimensions: half of the pairs end early.
         let (n, p) = (60, 256);
-        let group = |i: usize| if i % 2 == 0 { 0.0 } else { 3.0 };
+        let group = |i: usize| if i.is_multiple_of(2) { 0.0 } else { 3.0 };
         let data: Vec<f64> = (0..n * p).map(|k| group(k / p) + 0.05 * normal(1, k as u64)).collect();
         let squared: Vec<f64> = (0..n * n)
             .map(|k| super::super::source::squared_distance(&data[k / n * p..][..p], &data[k % n * p..][..p]))
