@@ -18,7 +18,6 @@ from scipy.spatial.distance import pdist, squareform
 
 pytest.importorskip("sklearn")
 from ble_unwrap_native import estimator
-from ble_unwrap_native._placement import LandmarkRegression
 from ble_unwrap_native.estimator import BernoulliLogisticEmbedding
 from sklearn.base import clone
 from sklearn.datasets import load_breast_cancer, load_digits, load_wine, make_s_curve, make_swiss_roll
@@ -276,7 +275,7 @@ def test_agrees_with_the_compiled_function():
     assert model.log_likelihood_ == pytest.approx(compiled.report["log_likelihood"], rel=1e-9)
     assert model.trace_ == pytest.approx(np.asarray(compiled.report["trace"]), rel=1e-9)
     assert np.allclose(pdist(model.embedding_), np.sqrt(model.sigma_) * pdist(np.asarray(compiled.coordinates)))
-    # So do landmarks, with the compiled placement of the rest, which knows no prior.
+    # So do landmarks, and the placement of the rest.
     by_landmarks = BernoulliLogisticEmbedding(kernel_width=0.3, n_landmarks=40, random_state=0).fit(BALL)
     own = squareform(pdist(BALL))
     chosen = by_landmarks.landmark_indices_
@@ -393,6 +392,13 @@ def test_a_given_start_is_in_the_scale_of_the_embedding():
     assert misfit(first.embedding_, by_landmarks.embedding_) < 1e-3
 
 
+def test_a_given_start_is_scaled_by_the_width_that_the_mean_affinity_has():
+    data = PLANE + 0.02 * np.random.default_rng(0).normal(size=PLANE.shape)
+    first = BernoulliLogisticEmbedding(mean_affinity=0.1).fit(data)
+    again = BernoulliLogisticEmbedding(mean_affinity=0.1, initial=first.embedding_).fit(data)
+    assert again.sigma_ == first.sigma_ and again.trace_[0] == pytest.approx(first.log_likelihood_, rel=1e-3)
+
+
 def test_truncation_drops_small_affinities():
     full, cut = (BernoulliLogisticEmbedding(truncation=t).fit(BALL) for t in (0.0, 1e-4))
     assert full.log_likelihood_ != cut.log_likelihood_ and misfit(full.embedding_, cut.embedding_) < 0.01
@@ -410,23 +416,6 @@ def test_far_lone_and_coincident_points_have_a_place():
     assert np.allclose(doubled.embedding_[:5], doubled.embedding_[60:65], atol=0.02)
     outlier = BernoulliLogisticEmbedding(metric="geodesic").fit(np.vstack([PLANE, PLANE.mean(axis=0) + 1e3]))
     assert np.isfinite(outlier.embedding_).all()
-
-
-def test_placement_is_the_maximum_of_the_likelihood():
-    random = np.random.default_rng(8)
-    for intercepts in (random.normal(size=30) - 1, np.empty(0)):
-        landmarks = random.normal(size=(30, 3))
-        p = random.uniform(size=(40, 30)) ** 3
-        design = np.column_stack([landmarks, np.ones(30)]) if len(intercepts) else landmarks
-        offset = intercepts if len(intercepts) else np.zeros(30)
-        places = LandmarkRegression(landmarks, intercepts).place(p, np.log(p / (1 - p)))
-        # The intercept is not returned: take the best for each place by Newton's method, then all slopes vanish.
-        a = np.zeros(40)
-        for _ in range(60 if len(intercepts) else 0):
-            q = 1 / (1 + np.exp(-(places @ landmarks.T + a[:, None] + offset)))
-            a += (p - q).sum(axis=1) / (q * (1 - q)).sum(axis=1)
-        q = 1 / (1 + np.exp(-(places @ landmarks.T + a[:, None] + offset)))
-        assert np.abs((p - q) @ design).max() < 1e-4
 
 
 # What does not come out ---------------------------------------------------------------------------------------------
@@ -493,6 +482,9 @@ def test_points_without_extent_are_refused():
     for metric in ("euclidean", "geodesic"):
         with pytest.raises(ValueError, match="all points coincide"):
             BernoulliLogisticEmbedding(metric=metric).fit(np.ones((20, 3)))
+    doubled = np.vstack([FLAT[:2]] * 20)
+    with pytest.raises(ValueError, match=r"mean_affinity == 0.1: no kernel width has it; it must be above 0.24"):
+        BernoulliLogisticEmbedding(1, mean_affinity=0.1).fit(doubled)
     with pytest.raises(ValueError, match="their squares overflow"):
         BernoulliLogisticEmbedding().fit(1e200 * BALL)
 

@@ -260,8 +260,7 @@ PACKAGE = ROOT / "native/ble_unwrap_native/python/ble_unwrap_native"
 # Python has no scikit-learn, and the package shall load where there is no NumPy either.
 PACKAGE_MAY_IMPORT = {
     "__init__.py": {"._native"},
-    "estimator.py": {".", "._placement", "joblib", "numpy", "scipy", "sklearn"},
-    "_placement.py": {"numpy"},
+    "estimator.py": {".", "joblib", "numpy", "scipy", "sklearn"},
 }
 
 

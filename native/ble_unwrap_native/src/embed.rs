@@ -69,8 +69,8 @@ impl Embedding {
     /// Notes
     /// -----
     /// Each point by itself: the maximum of its likelihood given the fitted points, which stay; for Isomap landmark
-    /// scaling. Geodesic distances lead over the ``neighbours`` nearest fitted points. Fitted points come out nearly, not
-    /// exactly, where they are. O(k) a point.
+    /// scaling. Geodesic distances lead over the ``neighbours`` nearest fitted points. Fitted points come out where
+    /// they are; by affinities, which do not tell that two points are one, nearly so. O(k) a point.
     #[pyo3(signature = (data, *, job=None, **settings))]
     fn transform(
         &self,
@@ -213,7 +213,7 @@ pub(crate) fn embed(
     };
     let metric = point_metric(metric, chosen, neighbours)?;
     let width = kernel_width(settings, mean_affinity, sigma)?;
-    let truncation = truncation.map_or(Ok(0.0), |given| number("truncation", given))?;
+    let truncation = truncation.map_or(Ok(0.0), |given| settings::number("truncation", given))?;
     let start = start(&mut call, initial)?;
 
     let shape = if chosen == DataKind::Points { "(n, p)" } else { "(n, n)" };
@@ -305,15 +305,10 @@ fn kernel_width(
         )));
     }
     Ok(match (mean_affinity, sigma) {
-        (Some(mean), _) => Some(KernelWidth::MeanAffinity(number("mean_affinity", mean)?)),
-        (_, Some(sigma)) => Some(KernelWidth::Absolute(number("sigma", sigma)?)),
+        (Some(mean), _) => Some(KernelWidth::MeanAffinity(settings::number("mean_affinity", mean)?)),
+        (_, Some(sigma)) => Some(KernelWidth::Absolute(settings::number("sigma", sigma)?)),
         (None, None) => None,
     })
-}
-
-/// A number; its range is the core's to check.
-fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
-    value.extract().map_err(|_| settings::refusal(name, "a number", value))
 }
 
 /// Start coordinates with their shape, or the word for a start, which goes to the settings.

@@ -10,6 +10,7 @@ mod job;
 mod measure;
 mod owned_array;
 mod pack;
+mod place;
 mod report;
 mod settings;
 mod unwrap;
@@ -38,6 +39,8 @@ mod native {
     use crate::owned_array::Array;
     #[pymodule_export]
     use crate::pack::{PackedCharts, pack};
+    #[pymodule_export]
+    use crate::place::place;
     #[pymodule_export]
     use crate::settings::default_settings;
     #[pymodule_export]

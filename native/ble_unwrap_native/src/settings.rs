@@ -47,6 +47,7 @@ pub(crate) enum Function {
     Embed,
     Flatten,
     Transform,
+    Place,
     GeodesicDistances,
     GraphDistances,
     Measure,
@@ -61,6 +62,7 @@ impl Function {
             Self::Embed => "embed",
             Self::Flatten => "flatten",
             Self::Transform => "transform",
+            Self::Place => "place",
             Self::GeodesicDistances => "geodesic_distances",
             Self::GraphDistances => "graph_distances",
             Self::Measure => "measure",
@@ -137,12 +139,14 @@ const CLOUD: &[Function] = &[Function::UnwrapPoints];
 const FLATTEN: &[Function] = &[Function::Flatten];
 const LANDMARKS: &[Function] = &[Function::Flatten, Function::UnwrapPoints];
 const EMBED: &[Function] = &[Function::Embed, Function::Flatten, Function::UnwrapPoints];
+const MODEL: &[Function] = &[Function::Embed, Function::Place, Function::Flatten, Function::UnwrapPoints];
 const GEODESICS: &[Function] = &[Function::GeodesicDistances, Function::Flatten];
 const PACK: &[Function] = &[Function::Pack, Function::UnwrapPoints];
 const TEXTURE: &[Function] = &[Function::Measure, Function::Pack, Function::UnwrapPoints];
 const ALL: &[Function] = &[
     Function::Embed,
     Function::Transform,
+    Function::Place,
     Function::Flatten,
     Function::GeodesicDistances,
     Function::GraphDistances,
@@ -165,7 +169,7 @@ const TABLE: &[Setting] = &[
     row("landmark_min", Field::Whole(|c| &mut c.settings.geodesics.landmark_min, [3, 100_000]), LANDMARKS),
     row("landmark_max", Field::Limit(|c| &mut c.settings.geodesics.landmark_max, [3, 100_000]), LANDMARKS),
     row("together_max", Field::Whole(|c| &mut c.settings.together_max, [0, MOST_TOGETHER]), FLATTEN),
-    row("model", Field::Word(|c| &mut c.settings.embedding.model), EMBED),
+    row("model", Field::Word(|c| &mut c.settings.embedding.model), MODEL),
     row("kernel_width", Field::OptionalReal(|c| &mut c.settings.embedding.kernel_width, Interval::above(0.0, 1e3)), EMBED),
     row("relaxation", Field::Real(|c| &mut c.settings.embedding.relaxation, Interval::between(0.0, 2.0)), EMBED),
     row("max_sweeps", Field::Whole(|c| &mut c.settings.embedding.max_sweeps, [1, 100_000]), EMBED),
@@ -304,6 +308,11 @@ pub(crate) fn flag(name: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
 fn real(name: &str, value: &Bound<'_, PyAny>, interval: Interval, or: &str) -> PyResult<f64> {
     let found = value.extract().ok().filter(|&x: &f64| interval.contains(x));
     found.ok_or_else(|| refusal(name, &format!("{}{or}", interval.text()), value))
+}
+
+/// A number; its range is the core's to check.
+pub(crate) fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    value.extract().map_err(|_| refusal(name, "a number", value))
 }
 
 /// A finite number above 0; `or` ends its description.

@@ -1,6 +1,6 @@
 //! The words by which Python names the choices of the core.
 
-use ble_unwrap_core::embedding::{Initial, Model, Update};
+use ble_unwrap_core::embedding::{Evidence, Initial, Model, Update};
 use ble_unwrap_core::geodesics::Metric;
 use ble_unwrap_core::packing::Rotation;
 use ble_unwrap_core::standalone::Connect;
@@ -45,6 +45,7 @@ macro_rules! words {
 }
 
 words!(DataKind { "points" => Points, "distances" => Distances, "affinities" => Affinities });
+words!(Evidence { "distances" => SquaredDistances, "affinities" => Affinities });
 words!(PointDistance { "euclidean" => Euclidean, "geodesic" => Geodesic });
 words!(Preset { "default" => Default, "paper" => Paper, "iso_charts" => IsoCharts });
 words!(Holes { "keep" => Keep, "cut" => Cut });

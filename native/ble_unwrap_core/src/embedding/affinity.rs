@@ -31,6 +31,15 @@ impl Kernel {
         }
     }
 
+    /// log(p/(1−p)) of the affinity p of two points with d²/2σ = `u`: exact however small p is; finite for finite `u`,
+    /// distances next to 0 being taken as a little more.
+    pub(super) fn log_odds(self, u: f64) -> f64 {
+        match self {
+            Self::Gaussian => -u - (-(-u.max(1e-12)).exp_m1()).ln(),
+            Self::Logistic => -u,
+        }
+    }
+
     /// The inverse of [`Kernel::affinity`]: d²/2σ, with affinities within 1e-12 of 0 or 1 taken as that near.
     /// Negative under the logistic kernel where p > ½, which classical scaling allows.
     pub(super) fn scaled_square(self, p: f64) -> f64 {
@@ -38,6 +47,19 @@ impl Kernel {
             Self::Gaussian => -p.max(1e-12).ln(),
             Self::Logistic => -log_odds(p),
         }
+    }
+
+    /// Whether affinities below `least` may be dropped.
+    pub(super) fn check_truncation(self, least: f64) -> Result<(), EmbeddingError> {
+        if least >= 0.0 && least < self.at_zero() {
+            return Ok(());
+        }
+        Err(EmbeddingError::InvalidSetting {
+            name: "truncation",
+            value: least,
+            expected: "not negative, and below the affinity at distance 0 (1 for the Gaussian kernel, 0.5 for the logistic \
+                       one)",
+        })
     }
 
     /// Affinity of a point with itself.
@@ -345,6 +367,12 @@ mod tests {
             assert!((Kernel::Gaussian.affinity(u) / (-u).exp() - 1.0).abs() < 1e-14);
             assert!((Kernel::Logistic.affinity(u) * (1.0 + u.exp()) - 1.0).abs() < 1e-14);
         }
+        for (kernel, u) in
+            [Kernel::Gaussian, Kernel::Logistic].into_iter().flat_map(|k| [0.1, 1.0, 20.0].map(|u| (k, u)))
+        {
+            assert!((kernel.log_odds(u) - log_odds(kernel.affinity(u))).abs() < 1e-9);
+        }
+        assert!(Kernel::Gaussian.log_odds(0.0).is_finite() && (Kernel::Gaussian.log_odds(1e4) + 1e4).abs() < 1e-9);
         assert_eq!(Kernel::Gaussian.affinity(0.0), Kernel::Gaussian.at_zero());
         assert_eq!(Kernel::Logistic.affinity(0.0), Kernel::Logistic.at_zero());
     }

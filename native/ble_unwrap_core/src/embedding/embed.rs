@@ -127,14 +127,7 @@ impl EmbedOptions<'_> {
         if let Some(width) = self.width {
             width.validate(kernel)?;
         }
-        if !(self.truncation >= 0.0 && self.truncation < kernel.at_zero()) {
-            return Err(EmbeddingError::InvalidSetting {
-                name: "truncation",
-                value: self.truncation,
-                expected: "not negative, and below the affinity at distance 0 (1 for the Gaussian kernel, 0.5 for the \
-                           logistic one)",
-            });
-        }
+        kernel.check_truncation(self.truncation)?;
         match self.landmarks {
             Some(points) if points <= self.dimensions => {
                 Err(EmbeddingError::TooFewPoints { points, dimensions: self.dimensions })
@@ -328,7 +321,8 @@ impl Task<'_> {
         let fit = fit(&affinity, q, &coordinates, &intercepts, &options, self.progress)?;
         drop(affinity);
         let model = LandmarkModel::new(q, &fit.coordinates, &fit.intercepts, self.kernel, fit.sigma)
-            .truncated(self.options.truncation);
+            .truncated(self.options.truncation)
+            .anchored();
         let placement =
             Placement { placer: Placer::Regression(model), reference, evidence: source.evidence(), dimensions: q };
         let (coordinates, intercepts) =

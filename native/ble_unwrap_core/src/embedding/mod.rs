@@ -48,6 +48,7 @@ pub use error::EmbeddingError;
 pub use gauge::fix_gauge;
 pub use input::{EmbedInput, PointMetric};
 pub use landmark_regression::{Evidence, LandmarkModel};
+pub use placement::{FittedLandmarks, place};
 pub use settings::{EmbeddingSettings, Initial, Model};
 pub use unfold::{plane, unfold};
 
@@ -55,5 +56,7 @@ pub use unfold::{plane, unfold};
 mod embed_tests;
 #[cfg(test)]
 mod flat_shapes;
+#[cfg(test)]
+mod landmark_tests;
 #[cfg(test)]
 mod misprints;

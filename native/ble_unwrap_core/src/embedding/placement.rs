@@ -6,11 +6,12 @@ use crate::Progress;
 use crate::linalg::Mds;
 use crate::progress::Cancelled;
 
-use super::affinity::Kernel;
+use super::affinity::{Kernel, KernelWidth};
 use super::embed::Embedding;
 use super::error::EmbeddingError;
 use super::input::{check_affinities, check_distances, check_points};
 use super::landmark_regression::{Evidence, LandmarkModel};
+use super::settings::Model;
 use super::source::{Reference, Source};
 
 /// How a point is placed by what is known of it and the landmarks.
@@ -56,6 +57,99 @@ impl Placer {
             }
         }
     }
+}
+
+/// Landmarks as plain arrays, which outlive the [`Embedding`] that they come from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FittedLandmarks<'a> {
+    /// The model.
+    pub model: Model,
+    /// Number of dimensions q ≥ 1.
+    pub dimensions: usize,
+    /// The k×q coordinates, row by row, in the unit of [`Embedding::coordinates`].
+    pub coordinates: &'a [f64],
+    /// The k intercepts of the default model; empty for the others.
+    pub intercepts: &'a [f64],
+    /// For Isomap the mean squared distance of all landmarks, itself included, to each; empty for the others.
+    pub mean_squared: &'a [f64],
+    /// The kernel width σ, a squared distance; 1 for affinities. Isomap does not use it.
+    pub sigma: f64,
+    /// Affinities below this count as 0; 0 keeps all.
+    pub truncation: f64,
+}
+
+impl FittedLandmarks<'_> {
+    fn placer(&self) -> Result<Placer, EmbeddingError> {
+        let kernel = self.model.kernel();
+        if self.dimensions == 0 {
+            return Err(EmbeddingError::InvalidSetting { name: "dimensions", value: 0.0, expected: "at least 1" });
+        }
+        let (q, k) = (self.dimensions, self.coordinates.len() / self.dimensions);
+        if k == 0 {
+            return Err(EmbeddingError::TooFewPoints { points: 0, dimensions: q });
+        }
+        KernelWidth::Absolute(self.sigma).validate(kernel)?;
+        kernel.check_truncation(self.truncation)?;
+        let only_for = |model| if self.model == model { k } else { 0 };
+        let lengths = [
+            (self.coordinates, k * q),
+            (self.intercepts, only_for(Model::Default)),
+            (self.mean_squared, only_for(Model::Isomap)),
+        ];
+        if let Some((values, expected)) = lengths.into_iter().find(|(values, expected)| values.len() != *expected) {
+            return Err(EmbeddingError::WrongLength { expected, found: values.len() });
+        }
+        check_points(self.coordinates, k, q)?;
+        for values in [self.intercepts, self.mean_squared] {
+            if let Some(point) = values.iter().position(|v| !v.is_finite()) {
+                return Err(EmbeddingError::NotFinite { point, component: q });
+            }
+        }
+        Ok(match self.model {
+            Model::Isomap => {
+                let mds = Mds::from_parts(self.coordinates.to_vec(), q, self.mean_squared.to_vec());
+                Placer::Scaling { mds, kernel }
+            }
+            Model::Default | Model::Paper => {
+                let model = LandmarkModel::new(q, self.coordinates, self.intercepts, kernel, self.sigma);
+                Placer::Regression(model.truncated(self.truncation).anchored())
+            }
+        })
+    }
+}
+
+/// Places `m` points by their distances (not squared) or affinities to k landmarks: m×q coordinates, row by row, as
+/// [`Embedding::transform`] does, which has the landmarks from the fit.
+///
+/// Deterministic for any number of threads. O(kq²) a point.
+///
+/// # Errors
+/// [`EmbeddingError::WrongLength`] unless there are m·k values, and k intercepts or means where the model has them;
+/// [`EmbeddingError::InvalidSetting`]; [`EmbeddingError::TooFewPoints`] without landmarks; [`EmbeddingError::NotFinite`]
+/// names the landmark; [`EmbeddingError::DistanceOutOfRange`] and [`EmbeddingError::AffinityOutOfRange`] name the first bad
+/// value; cancelled.
+pub fn place(
+    known: &[f64],
+    m: usize,
+    evidence: Evidence,
+    landmarks: &FittedLandmarks<'_>,
+    progress: &Progress,
+) -> Result<Vec<f64>, EmbeddingError> {
+    let placer = landmarks.placer()?;
+    let k = landmarks.coordinates.len() / landmarks.dimensions;
+    if m.checked_mul(k) != Some(known.len()) {
+        return Err(EmbeddingError::WrongLength { expected: m.saturating_mul(k), found: known.len() });
+    }
+    match evidence {
+        Evidence::SquaredDistances => check_distances(known, k, 0)?,
+        Evidence::Affinities => check_affinities(known, k, 0)?,
+    }
+    let observe = |i: usize, row: &mut [f64]| {
+        for (value, &given) in row.iter_mut().zip(&known[i * k..(i + 1) * k]) {
+            *value = if evidence == Evidence::SquaredDistances { given * given } else { given };
+        }
+    };
+    Ok(placer.place(m, landmarks.dimensions, evidence, observe, progress)?.0)
 }
 
 /// The landmarks of an embedding, and what relates points to them.
@@ -109,8 +203,8 @@ impl Embedding {
     /// `data` holds m rows of `columns` values of the kind that was embedded: points, or distances or affinities to the
     /// k fitted points. Each new point is placed by itself, as points that are no landmarks are: the maximum of its
     /// likelihood given the fitted points (for Isomap landmark scaling). A geodesic distance leads over the fitted points
-    /// nearest to it, as many as the graph has neighbours. A fitted point comes out where it is but for two
-    /// things: the fit may have stopped short of the maximum, and here the point also has itself as a landmark.
+    /// nearest to it, as many as the graph has neighbours. A fitted point, at distance 0 from itself, comes out
+    /// where it is; by affinities, which do not tell that, nearly so.
     /// Deterministic for any number of threads. O(kq²) a point, and to find the nearest O(np) along a graph.
     ///
     /// # Errors

@@ -30,6 +30,22 @@ pub struct Mds {
 }
 
 impl Mds {
+    /// From the k×m coordinates of a scaling and the mean squared distance of all points to each, to place further ones.
+    ///
+    /// The columns are taken to be orthogonal and to have mean zero, as scaling makes them.
+    ///
+    /// # Panics
+    /// If there are not k·m coordinates.
+    #[must_use]
+    pub fn from_parts(coordinates: Vec<f64>, dimensions: usize, mean_squared: Vec<f64>) -> Self {
+        assert_eq!(coordinates.len(), dimensions * mean_squared.len(), "m coordinates a point");
+        let mut eigenvalues = vec![0.0; dimensions];
+        for row in coordinates.chunks_exact(dimensions.max(1)) {
+            eigenvalues.iter_mut().zip(row).for_each(|(sum, x)| *sum += x * x);
+        }
+        Self { eigenvalues, dimensions, coordinates, mean_squared }
+    }
+
     /// Number of points k.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -74,7 +90,8 @@ impl Mds {
             }
         }
         for (sum, value) in place[..kept].iter_mut().zip(&self.eigenvalues) {
-            *sum /= value;
+            // A dimension without extent, which a scaling does not keep but given coordinates may have, stays empty.
+            *sum = if *value == 0.0 { 0.0 } else { *sum / value };
         }
     }
 }
@@ -239,6 +256,24 @@ mod tests {
         }
         for (a, b) in squared(&placed).iter().zip(&all) {
             assert!((a - b).abs() < 1e-11, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn places_further_points_by_parts_as_by_the_whole() {
+        let points = scatter(20);
+        let d = squared(&points);
+        let among: Vec<f64> = (0..64).map(|i| d[i / 8 * 20 + i % 8]).collect();
+        let mds = classical_mds(&among, 8, 2).expect("finite");
+        // One more column, which is empty.
+        let coordinates = mds.coordinates.chunks_exact(2).flat_map(|c| [c[0], c[1], 0.0]).collect();
+        let mean = among.chunks_exact(8).map(|row| row.iter().sum::<f64>() / 8.0).collect();
+        let parts = Mds::from_parts(coordinates, 3, mean);
+        let (mut one, mut other) = ([0.0; 2], [1.0; 3]);
+        for v in 0..20 {
+            mds.place(&d[v * 20..v * 20 + 8], &mut one);
+            parts.place(&d[v * 20..v * 20 + 8], &mut other);
+            assert!((one[0] - other[0]).abs() + (one[1] - other[1]).abs() < 1e-12 && other[2] == 0.0);
         }
     }
 

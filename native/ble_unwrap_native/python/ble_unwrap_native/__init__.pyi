@@ -26,6 +26,7 @@ __all__ = [
     "graph_distances",
     "measure",
     "pack",
+    "place",
     "submit_unwrap",
     "submit_unwrap_points",
     "unwrap",
@@ -44,6 +45,10 @@ class InternalError(BleUnwrapError): ...
 class _Threads(TypedDict, total=False):
     preset: Literal["default", "paper", "iso_charts"]
     threads: int
+
+@type_check_only
+class _PlaceSettings(_Threads, total=False):
+    model: Literal["default", "paper", "isomap"]
 
 @type_check_only
 class _GeodesicSettings(_Threads, total=False):
@@ -262,4 +267,16 @@ def pack(
     job: Job | None = None,
     **settings: Unpack[_PackSettings],
 ) -> PackedCharts: ...
+def place(
+    data: Buffer,
+    coordinates: Buffer,
+    intercepts: Buffer | None = None,
+    *,
+    kind: Literal["distances", "affinities"] = "distances",
+    sigma: float = 1.0,
+    truncation: float = 0.0,
+    mean_squared: Buffer | None = None,
+    job: Job | None = None,
+    **settings: Unpack[_PlaceSettings],
+) -> Array: ...
 def default_settings(preset: Literal["default", "paper", "iso_charts"] = "default") -> dict[str, Any]: ...

@@ -11,8 +11,7 @@ from numbers import Integral, Real
 from typing import Any, Literal
 
 import numpy as np
-from joblib import Parallel, delayed, effective_n_jobs  # type: ignore[import-untyped]
-from scipy.optimize import brentq  # type: ignore[import-untyped]
+from joblib import effective_n_jobs  # type: ignore[import-untyped]
 from scipy.spatial.distance import cdist  # type: ignore[import-untyped]
 from sklearn.base import (  # type: ignore[import-untyped]
     BaseEstimator,
@@ -24,8 +23,7 @@ from sklearn.neighbors import NearestNeighbors  # type: ignore[import-untyped]
 from sklearn.utils import check_random_state, check_scalar  # type: ignore[import-untyped]
 from sklearn.utils.validation import check_is_fitted, validate_data  # type: ignore[import-untyped]
 
-from . import InvalidArgumentError, embed, graph_distances
-from ._placement import LandmarkRegression, LandmarkScaling, affinities, affinity_log_odds, chunks, log_odds
+from . import InvalidArgumentError, embed, graph_distances, place
 
 __all__ = ["BernoulliLogisticEmbedding"]
 
@@ -35,14 +33,12 @@ __all__ = ["BernoulliLogisticEmbedding"]
 DEFAULT_RELATIVE_WIDTH = 0.05
 # What sets σ for the published model, as in `embed`: near it the folds are fewest.
 PUBLISHED_MEAN_AFFINITY = 0.57
-# A mean affinity is sought with σ from 2⁻⁶⁰ to 2⁶⁰ times the mean squared distance.
-MOST_OCTAVES = 60
 # Up to so many points each is a landmark; scaling takes O(n³) and a sweep O(n²).
 MOST_POINTS_WITHOUT_LANDMARKS = 2_000
 # Landmarks of more points than that. On digits, tori and rolls 200 lose nothing against all points.
 DEFAULT_LANDMARKS = 500
 
-# To type checkers of Python 3.11 a NumPy array is no buffer, which `embed` and `graph_distances` take.
+# To type checkers of Python 3.11 a NumPy array is no buffer, which the compiled functions take.
 Bytes = Any
 
 CHOICES = {
@@ -480,44 +476,38 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
         except InvalidArgumentError as error:
             raise ValueError(str(error)) from error
 
-        self._placement: LandmarkRegression | LandmarkScaling
         report, places = fit.report, np.asarray(fit.coordinates).copy()
         self.intercepts_ = np.asarray(fit.intercepts).copy()
         if self.model == "isomap":
             self.log_likelihood_ = self.bregman_ = float("nan")
             self.trace_, self.n_iter_, self.converged_ = np.empty(0), 0, True
-            self._placement = LandmarkScaling(places, own**2)
+            self._mean_squared = np.mean(own**2, axis=0)
         else:
             self.log_likelihood_, self.bregman_ = report["log_likelihood"], report["bregman"]
             self.trace_ = np.asarray(report["trace"])
             self.n_iter_, self.converged_ = report["sweeps"], report["converged"]
             places = self._in_standard_pose(places)
-            self._placement = LandmarkRegression(places, self.intercepts_)
         self._landmarks = places
         return places
 
-    def _kernel_width(self, own: np.ndarray, mean_squared: float) -> float:
+    def _kernel_width(self, own: Bytes, mean_squared: float) -> float:
         """σ of the landmarks with these distances."""
         if self.model == "isomap":
             return float("nan")
-        target = self.mean_affinity
-        if self.kernel_width is not None or (target is None and self.model == "default"):
+        if self.mean_affinity is None and (self.kernel_width is not None or self.model == "default"):
             return float(self.kernel_width or DEFAULT_RELATIVE_WIDTH) * mean_squared
-        target = PUBLISHED_MEAN_AFFINITY if target is None else float(target)
-        squared, kernel = own**2, self._kernel()
-
-        def excess(octave: float) -> float:
-            return _mean_over_pairs(affinities(squared, mean_squared * 2.0**octave, kernel)) - target
-
-        if not excess(-MOST_OCTAVES) < 0 < excess(MOST_OCTAVES):
+        target = PUBLISHED_MEAN_AFFINITY if self.mean_affinity is None else float(self.mean_affinity)
+        # However narrow the kernel, pairs that coincide have its affinity at distance 0.
+        least = self._most() * _mean_over_pairs(own == 0)
+        if not least < target < self._most():
             raise ValueError(
-                f"mean_affinity == {target}: no kernel width has it; it must be above 0 and below the affinity at "
-                f"distance 0, {self._most()}"
+                f"mean_affinity == {target}: no kernel width has it; it must be above {least} and below the affinity "
+                f"at distance 0, {self._most()}"
             )
-        return mean_squared * 2.0 ** brentq(excess, -MOST_OCTAVES, MOST_OCTAVES)
-
-    def _kernel(self) -> str:
-        return "gaussian" if self.model == "paper" else "logistic"
+        # The compiled fit chooses σ; one sweep, for a start may have to be scaled by σ before the fit that counts.
+        options: dict[str, Any] = {"initial": "random", "max_sweeps": 1, "threads": effective_n_jobs(self.n_jobs)}
+        chosen = embed(own, kind="distances", dimensions=1, model=self.model, mean_affinity=target, **options)
+        return float(chosen.report["sigma"])
 
     def _unit(self) -> float:
         """What makes lengths of the likelihood's coordinates."""
@@ -535,27 +525,21 @@ class BernoulliLogisticEmbedding(ClassNamePrefixFeaturesOutMixin, TransformerMix
         largest = np.abs(places).argmax(axis=0)
         return places * np.where(places[largest, np.arange(places.shape[1])] < 0, -1.0, 1.0)
 
-    def _place(self, known: np.ndarray) -> np.ndarray:
+    def _place(self, known: Bytes) -> np.ndarray:
         """Places points by their distances, or affinities, to the landmarks, in units of √σ."""
-        # NumPy lets other threads work while it does.
-        work = Parallel(n_jobs=self.n_jobs, prefer="threads")
-        return np.concatenate(work(delayed(self._place_part)(part) for part in chunks(known)))
-
-    def _place_part(self, known: np.ndarray) -> np.ndarray:
-        if isinstance(self._placement, LandmarkScaling):
-            return self._placement.place(known**2)
-        if self.metric == "precomputed_affinity":
-            p, odds = known, affinity_log_odds(known)
+        options: dict[str, Any] = {"model": self.model, "threads": effective_n_jobs(self.n_jobs)}
+        if self.model == "isomap":
+            options["mean_squared"] = self._mean_squared
         else:
-            squared = known**2
-            p = affinities(squared, self.sigma_, self._kernel())
-            odds = log_odds(squared, self.sigma_, self._kernel())
-        placed = self._placement.place(np.where(p < self.truncation, 0.0, p), odds)
-        if self.metric != "precomputed_affinity":
-            coincident, landmark = np.nonzero(known == 0)
-            # Of several coincident landmarks the first counts.
-            placed[coincident[::-1]] = self._landmarks[landmark[::-1]]
-        return placed
+            options |= {"sigma": self.sigma_, "truncation": float(self.truncation)}
+        if self.metric == "precomputed_affinity":
+            options["kind"] = "affinities"
+        landmarks: Bytes = self._landmarks
+        intercepts: Bytes = self.intercepts_
+        try:
+            return np.array(place(known, landmarks, intercepts, **options))
+        except InvalidArgumentError as error:
+            raise ValueError(str(error)) from error
 
 
 def _mean_over_pairs(matrix: np.ndarray) -> float:
