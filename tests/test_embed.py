@@ -2,6 +2,7 @@
 beside the core's code."""
 
 import itertools
+import multiprocessing
 
 import ble_unwrap_native as native
 import numpy as np
@@ -167,6 +168,19 @@ def test_the_same_bytes_for_any_number_of_threads(options):
     assert len(placed) == 1
 
 
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no fork here")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_process_has_threads_of_its_own():
+    native.embed(CLOUD)
+    child = multiprocessing.get_context("fork").Process(target=native.embed, args=(CLOUD,))
+    child.start()
+    child.join(60)
+    stuck = child.is_alive()
+    child.kill()
+    child.join()
+    assert not stuck and child.exitcode == 0
+
+
 # Wrong input --------------------------------------------------------------------------------------------------------
 
 CLOUD = np.random.default_rng(13).random((20, 3))
@@ -204,9 +218,13 @@ APART = np.vstack([CLOUD, CLOUD + 100])
         (CLOUD, {"sigma": 1.0, "kernel_width": 0.2}, "at most one of kernel_width, mean_affinity and sigma"),
         (CLOUD, {"truncation": 1.5}, "truncation is 1.5"),
         (CLOUD, {"truncation": "all"}, "truncation: expected a number"),
-        (CLOUD, {"landmarks": 2}, "2 points do not span 2 dimensions"),
+        (CLOUD, {"landmarks": 2}, "landmarks is 2, but must be above the number of dimensions"),
+        (np.repeat(CLOUD[:2], 9, axis=0), {"landmarks": 5}, "2 distinct places only"),
+        (1e-157 * CLOUD, {}, "the largest coordinate is .*e-158; scale the data"),
+        (1e40 * distances_of(CLOUD), {"kind": "distances"}, "the largest distance is .*e40; scale the data"),
         (CLOUD, {"initial": np.zeros((20, 3))}, r"initial: expected shape \(20, 2\), a row for each point"),
-        (CLOUD, {"initial": np.full((20, 2), np.nan)}, "not finite"),
+        (CLOUD, {"initial": np.full((20, 2), np.nan)}, "component 0 of point 0 of the start is not finite"),
+        (CLOUD, {"initial": np.zeros((20, 2))}, "the start is 0 for all points, a saddle"),
         (CLOUD, {"initial": "pca"}, "initial: expected 'mds' or 'random'"),
         (CLOUD, {"stretch_limit": 1.1}, r"embed\(\) has no setting 'stretch_limit'"),
     ],

@@ -69,26 +69,9 @@ def traces(mesh=None, sweeps=40):
     return found
 
 
-def graph_distances(points, neighbours=NEIGHBOURS):
-    """Shortest paths along the graph of nearest neighbours, as Isomap has them; the graph must be connected."""
-    from scipy.sparse.csgraph import shortest_path
-    from sklearn.neighbors import kneighbors_graph
-
-    graph = kneighbors_graph(points, neighbours, mode="distance")
-    distances = shortest_path(graph, directed=False)
-    if not np.isfinite(distances).all():
-        raise ValueError(f"the graph of {neighbours} neighbours is not connected")
-    return distances
-
-
-def embedded_by_ble(distances):
-    """Two dimensions by the default model, from distances."""
-    fit = ble.embed(distances, kind="distances")
-    return np.asarray(fit.coordinates)
-
-
 def trustworthiness_table(samples=1500):
     """[(data set, method, trustworthiness, seconds)]; all in one run, with 12 neighbours."""
+    from ble_unwrap_native.estimator import BernoulliLogisticEmbedding
     from sklearn.datasets import load_digits, make_swiss_roll
     from sklearn.manifold import TSNE, Isomap, SpectralEmbedding, trustworthiness
     from threadpoolctl import threadpool_limits
@@ -97,8 +80,8 @@ def trustworthiness_table(samples=1500):
     found = []
     for name, points in (("swiss roll", roll), ("digits", load_digits().data)):
         methods = {
-            "BLE, graph distances": lambda x: embedded_by_ble(graph_distances(x)),
-            "BLE, Euclidean distances": lambda x: np.asarray(ble.embed(x).coordinates),
+            "BLE, graph distances": BernoulliLogisticEmbedding(metric="geodesic").fit_transform,
+            "BLE, Euclidean distances": BernoulliLogisticEmbedding().fit_transform,
             "Isomap": lambda x: Isomap(n_neighbors=NEIGHBOURS, n_components=2).fit_transform(x),
             "SpectralEmbedding": lambda x: SpectralEmbedding(n_neighbors=NEIGHBOURS, random_state=0).fit_transform(x),
             "t-SNE": lambda x: TSNE(random_state=0).fit_transform(x),

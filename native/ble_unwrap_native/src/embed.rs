@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use ble_unwrap_core::embedding::{self, EmbedInput, EmbedOptions, KernelWidth, PointMetric};
+use ble_unwrap_core::standalone::CloudDistanceSettings;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
@@ -117,8 +118,6 @@ pub(crate) enum PointDistance {
 const MOST_DIMENSIONS: usize = 100_000;
 /// More neighbours make a graph larger than the matrix it is to stand for.
 const MOST_NEIGHBOURS: usize = 100_000;
-/// As many as `graph_distances` takes: distances 3 % too long on average, where 6 give 10 %.
-const DEFAULT_NEIGHBOURS: usize = 12;
 
 /// Embed points, distances or affinities in few dimensions by Bernoulli logistic embedding.
 ///
@@ -206,7 +205,7 @@ pub(crate) fn embed(
         given.map_or(Ok(usual), |given| settings::whole(name, given, [1, most], ""))
     };
     let dimensions = whole("dimensions", dimensions, 2, MOST_DIMENSIONS)?;
-    let neighbours = whole("neighbours", neighbours, DEFAULT_NEIGHBOURS, MOST_NEIGHBOURS)?;
+    let neighbours = whole("neighbours", neighbours, CloudDistanceSettings::default().neighbours, MOST_NEIGHBOURS)?;
     let landmarks = match landmarks {
         Some(given) => Some(settings::whole("landmarks", given, [1, i32::MAX as usize], ", or None for all points")?),
         None => None,

@@ -171,6 +171,10 @@ impl Raised for EmbeddingError {
             | Self::DistanceOutOfRange { .. }
             | Self::AffinityOutOfRange { .. }
             | Self::TooFewPoints { .. }
+            | Self::OutOfScale { .. }
+            | Self::TooFewPlaces { .. }
+            | Self::StartNotFinite { .. }
+            | Self::StartAtSaddle
             | Self::Disconnected { .. }
             | Self::TooManyPoints { .. }
             | Self::WrongColumns { .. } => Kind::Argument,

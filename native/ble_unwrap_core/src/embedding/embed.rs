@@ -98,8 +98,9 @@ const ISOMAP_TOLERANCE: f64 = 1e-10;
 /// distances with landmarks over their rows, and so are they along a graph with truncation.
 ///
 /// # Errors
-/// [`EmbeddingError::InvalidSetting`]; [`EmbeddingError::TooFewPoints`] unless points and landmarks outnumber the
-/// dimensions; [`EmbeddingError::WrongLength`]; [`EmbeddingError::NotFinite`], [`EmbeddingError::DistanceOutOfRange`] and
+/// [`EmbeddingError::InvalidSetting`]; [`EmbeddingError::TooFewPoints`] and [`EmbeddingError::TooFewPlaces`] unless points
+/// and, with landmarks, distinct places outnumber the dimensions; [`EmbeddingError::OutOfScale`] beyond 1e±30;
+/// [`EmbeddingError::StartNotFinite`], [`EmbeddingError::StartAtSaddle`]; [`EmbeddingError::WrongLength`]; [`EmbeddingError::NotFinite`], [`EmbeddingError::DistanceOutOfRange`] and
 /// [`EmbeddingError::AffinityOutOfRange`] name the first bad value; [`EmbeddingError::Disconnected`];
 /// [`EmbeddingError::TooManyPoints`] to fit at once; [`EmbeddingError::NoExtent`]; cancelled.
 pub fn embed(
@@ -129,9 +130,11 @@ impl EmbedOptions<'_> {
         }
         kernel.check_truncation(self.truncation)?;
         match self.landmarks {
-            Some(points) if points <= self.dimensions => {
-                Err(EmbeddingError::TooFewPoints { points, dimensions: self.dimensions })
-            }
+            Some(count) if count <= self.dimensions => Err(EmbeddingError::InvalidSetting {
+                name: "landmarks",
+                value: count as f64,
+                expected: "above the number of dimensions",
+            }),
             _ => Ok(()),
         }
     }
@@ -144,7 +147,8 @@ fn check_start(options: &EmbedOptions<'_>, n: usize) -> Result<(), EmbeddingErro
         return Err(EmbeddingError::WrongLength { expected: n.saturating_mul(q), found: start.len() });
     }
     match start.iter().position(|v| !v.is_finite()) {
-        Some(i) => Err(EmbeddingError::NotFinite { point: i / q, component: i % q }),
+        Some(i) => Err(EmbeddingError::StartNotFinite { point: i / q, component: i % q }),
+        None if start.iter().all(|v| *v == 0.0) => Err(EmbeddingError::StartAtSaddle),
         None => Ok(()),
     }
 }
@@ -193,8 +197,12 @@ impl Task<'_> {
 
     fn by_landmarks(&self, source: &Source<'_>, count: usize) -> Result<Embedding, EmbeddingError> {
         let points = source.farthest_order(count, self.progress)?;
-        if points.len() <= self.options.dimensions {
-            return Err(EmbeddingError::NoExtent);
+        match points.len() {
+            0 | 1 => return Err(EmbeddingError::NoExtent),
+            places if places <= self.options.dimensions => {
+                return Err(EmbeddingError::TooFewPlaces { places, dimensions: self.options.dimensions });
+            }
+            _ => {}
         }
         let reference = source.reference(&points, self.progress)?;
         let mut among = source.among(&points, &reference);
@@ -305,7 +313,7 @@ impl Task<'_> {
         let (coordinates, intercepts) = mds_start(&mds, sigma.sqrt(), q);
         let options = self.settings.fit_options();
         let fit = fit(&affinity, q, &coordinates, &intercepts, &options, self.progress)?;
-        let model = LandmarkModel::new(q, &fit.coordinates, &fit.intercepts, self.kernel, sigma);
+        let model = LandmarkModel::new(q, &fit.coordinates, &fit.intercepts, self.kernel, sigma).anchored();
         let observe = |i: usize, row: &mut [f64]| {
             row.iter_mut().zip(&landmarks).for_each(|(square, l)| *square = squared[i * n + l]);
         };

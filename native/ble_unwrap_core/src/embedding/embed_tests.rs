@@ -329,7 +329,7 @@ fn a_given_start_is_taken() {
     let mut bad = turned.clone();
     bad[5] = f64::NAN;
     let bad = EmbedOptions { start: Some(&bad), ..with(2) };
-    let expected = EmbeddingError::NotFinite { point: 2, component: 1 };
+    let expected = EmbeddingError::StartNotFinite { point: 2, component: 1 };
     assert_eq!(run(euclidean(&data, 2), &bad, &settings).err(), Some(expected));
 }
 
@@ -461,9 +461,37 @@ fn bad_input_is_named() {
     for relaxation in [0.0, 2.0, -1.0, f64::NAN] {
         assert_eq!(named(&with(2), &EmbeddingSettings { relaxation, ..settings.clone() }), "relaxation");
     }
-    let few = EmbedOptions { landmarks: Some(2), ..with(2) };
-    let expected = Some(EmbeddingError::TooFewPoints { points: 2, dimensions: 2 });
-    assert_eq!(run(euclidean(&square, 2), &few, &settings).err(), expected);
+    assert_eq!(named(&EmbedOptions { landmarks: Some(2), ..with(2) }, &settings), "landmarks");
+    let started =
+        |start: &[f64]| run(euclidean(&square, 2), &EmbedOptions { start: Some(start), ..with(2) }, &settings).err();
+    let nan = [1.0, 1.0, 1.0, f64::NAN, 1.0, 1.0, 1.0, 1.0];
+    assert_eq!(started(&nan), Some(EmbeddingError::StartNotFinite { point: 1, component: 1 }));
+    assert_eq!(started(&[0.0; 8]), Some(EmbeddingError::StartAtSaddle));
+    for scale in [1e-157, 1e40] {
+        let scaled: Vec<f64> = square.iter().map(|v| scale * v).collect();
+        let found = run(euclidean(&scaled, 2), &with(2), &settings).err();
+        assert_eq!(found, Some(EmbeddingError::OutOfScale { what: "coordinate", largest: scale }));
+    }
+    let two_places: Vec<f64> = (0..40).flat_map(|i| [f64::from(i % 2), 0.0]).collect();
+    let found = run(euclidean(&two_places, 2), &EmbedOptions { landmarks: Some(5), ..with(2) }, &settings).err();
+    assert_eq!(found, Some(EmbeddingError::TooFewPlaces { places: 2, dimensions: 2 }));
+}
+
+#[test]
+fn narrow_kernels_and_far_points_are_placed_among_landmarks() {
+    // Landmarks further apart than the kernel sees: only the anchor says where the other points are.
+    let points: Vec<Point2<f64>> =
+        (0..800).map(|i| Point2::new((f64::from(i) * 0.618).fract(), (f64::from(i) * 0.383).fract())).collect();
+    let data = flat(&points);
+    for width in [0.2, 0.01, 1e-3, 1e-4] {
+        let options = EmbedOptions { landmarks: Some(20), width: Some(KernelWidth::Relative(width)), ..with(2) };
+        let found = run(euclidean(&data, 2), &options, &EmbeddingSettings::default()).expect("valid");
+        assert!(misfit(&points, &scaled(&found)) < 1e-3, "{width}: {}", misfit(&points, &scaled(&found)));
+        let far = found.transform(&[20.0, 0.5], 1, 2, &Progress::new()).expect("valid");
+        let apart = (0..2).map(|c| (far[c] - found.coordinates[c]).powi(2)).sum::<f64>().sqrt() * found.sigma.sqrt();
+        let expected = (Point2::new(20.0, 0.5) - points[0]).norm();
+        assert!((apart / expected - 1.0).abs() < 0.01, "{width}: {apart} {expected}");
+    }
 }
 
 #[test]

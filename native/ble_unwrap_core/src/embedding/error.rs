@@ -83,6 +83,33 @@ pub enum EmbeddingError {
         /// The affinity.
         value: f64,
     },
+    /// Coordinates or distances whose squares are lost to rounding, or nearly.
+    #[error("the largest {what} is {largest:.1e}; scale the data so that it lies between 1e-30 and 1e30")]
+    OutOfScale {
+        /// What was measured.
+        what: &'static str,
+        /// Its largest size.
+        largest: f64,
+    },
+    /// Points that coincide are no more landmarks than one.
+    #[error("the points lie in {places} distinct places only, which do not span {dimensions} dimensions")]
+    TooFewPlaces {
+        /// Number of places.
+        places: usize,
+        /// Number of dimensions asked for.
+        dimensions: usize,
+    },
+    /// A coordinate of the start is infinite or not a number.
+    #[error("component {component} of point {point} of the start is not finite")]
+    StartNotFinite {
+        /// Number of the point.
+        point: usize,
+        /// Number of the component.
+        component: usize,
+    },
+    /// No sweep leaves the start 0.
+    #[error("the start is 0 for all points, a saddle that no sweep leaves; start from classical scaling or at random")]
+    StartAtSaddle,
     /// There must be more points than dimensions.
     #[error("{points} points do not span {dimensions} dimensions")]
     TooFewPoints {

@@ -87,11 +87,24 @@ impl<'a> EmbedInput<'a> {
             Self::Points { p, metric: PointMetric::Geodesic { neighbours: 0 }, .. } if p > 0 => {
                 Err(EmbeddingError::InvalidSetting { name: "neighbours", value: 0.0, expected: "at least 1" })
             }
-            Self::Points { n, p, data, .. } => check_points(data, n, p),
-            Self::Distances { n, data } => check_distances(data, n, n),
+            Self::Points { n, p, data, .. } => {
+                check_points(data, n, p)?;
+                check_scale("coordinate", data.iter().fold(0.0, |most, v| v.abs().max(most)))
+            }
+            Self::Distances { n, data } => {
+                check_distances(data, n, n)?;
+                let off = data.iter().enumerate().filter(|(k, _)| k / n != k % n);
+                check_scale("distance", off.fold(0.0, |most, (_, v)| v.max(most)))
+            }
             Self::Affinities { n, data } => check_affinities(data, n, n),
         }
     }
+}
+
+/// Squares and their sums keep their digits, in single precision, too. All zero is another matter.
+fn check_scale(what: &'static str, largest: f64) -> Result<(), EmbeddingError> {
+    const SCALES: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
+    if largest == 0.0 || SCALES.contains(&largest) { Ok(()) } else { Err(EmbeddingError::OutOfScale { what, largest }) }
 }
 
 /// All coordinates are finite, and so small that the sum of the squared distances of `n` points is.

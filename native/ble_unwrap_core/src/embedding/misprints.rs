@@ -295,6 +295,10 @@ fn convergence_is_linear() {
     let t = (0..6000).find(|t| gap(*t) < 1e-5 * long.log_likelihood.abs()).expect("converges");
     let factors: Vec<f64> = (t..t + 4).map(|t| gap(t + 1) / gap(t)).collect();
     assert!(factors.iter().all(|f| (0.3..1.0).contains(f) && (f / factors[0] - 1.0).abs() < 0.05), "{factors:?}");
+    // Theorem 4.1 (ii), which does hold: the gradient tends to 0.
+    let steepest = |problem: &Problem| (0..problem.n).map(|i| problem.gradient(i).norm()).fold(0.0, f64::max);
+    let end = Problem { x: long.coordinates, ..problem.clone() };
+    assert!(steepest(&end) < 1e-3 * steepest(&problem), "{} {}", steepest(&end), steepest(&problem));
 }
 
 /// Printed: (5) and (13) divide the squared distance by 2σ and call σ a width. Holds: σ is a squared length, the
