@@ -19,7 +19,7 @@ pub enum Kernel {
 
 impl Kernel {
     /// Affinity of two points with d²/2σ = `u` ≥ 0.
-    #[inline(always)]
+    #[inline]
     #[must_use]
     pub fn affinity(self, u: f64) -> f64 {
         match self {
@@ -172,10 +172,7 @@ impl Affinity {
         let scale = 0.5 / sigma;
         let mut values = vec![0.0; squared.len()];
         values.par_chunks_mut(n.max(1)).zip(squared.par_chunks(n.max(1))).for_each(|(values, squared)| {
-            pulp::Arch::new().dispatch(
-                #[inline(always)]
-                || values.iter_mut().zip(squared).for_each(|(p, d)| *p = kernel.affinity(d * scale)),
-            );
+            values.iter_mut().zip(squared).for_each(|(p, d)| *p = kernel.affinity(d * scale));
         });
         Ok(Self { n, values, sigma })
     }
@@ -291,16 +288,8 @@ const MOST_REFINEMENTS: usize = 30;
 /// Relative error of the mean affinity; a thousand times below what changes an embedding visibly.
 const MEAN_TOLERANCE: f64 = 1e-6;
 
-/// Mean of a term over the pairs of a symmetric matrix, summed in fixed order and compiled for the widest registers.
+/// Mean of a term over the pairs of a symmetric matrix, summed in fixed order.
 fn mean_over_pairs(squared: &[f64], n: usize, term: impl Fn(f64) -> f64) -> f64 {
-    pulp::Arch::new().dispatch(
-        #[inline(always)]
-        || sum_over_pairs(squared, n, term),
-    ) / pair_count(n).max(1.0)
-}
-
-#[inline(always)]
-fn sum_over_pairs(squared: &[f64], n: usize, term: impl Fn(f64) -> f64) -> f64 {
     const LANES: usize = 4;
     let mut total = 0.0;
     for i in 0..n {
@@ -315,7 +304,7 @@ fn sum_over_pairs(squared: &[f64], n: usize, term: impl Fn(f64) -> f64) -> f64 {
         }
         total += lanes.iter().sum::<f64>() + rest;
     }
-    total
+    total / pair_count(n).max(1.0)
 }
 
 fn pair_count(n: usize) -> f64 {
