@@ -3,7 +3,7 @@
 import numpy as np
 
 from . import cloud_bridge, cloud_report, engine, properties
-from .task import Outcome, Timer, bounds_of, placed
+from .task import Outcome, Timer, bounds_to_keep, placed
 
 
 class CloudTask:
@@ -25,14 +25,11 @@ class CloudTask:
 
     def _keep_place(self):
         held = cloud_bridge.read_uvs(self.cloud, self.settings["uv_map_name"])
-        if held is None or not np.isfinite(held).all():
-            self.cloud.warnings.append(f"{self.title}: there were no UVs whose place could be kept")
-            return
-        self.bounds = bounds_of(held, self.settings["texture_size"])
+        self.bounds, why_not = bounds_to_keep(held, self.settings["texture_size"])
         if self.bounds is None:
-            self.cloud.warnings.append(f"{self.title}: the old UVs fill no rectangle; the whole square was used")
-            return
-        self.native["texture_size"] = self.bounds.pixels
+            self.cloud.warnings.append(f"{self.title}: {why_not[0].lower()}{why_not[1:]}")
+        else:
+            self.native["texture_size"] = self.bounds.pixels
 
     @property
     def title(self):

@@ -62,15 +62,11 @@ class UnwrapTask:
 
     def _keep_place(self):
         """Packs for the part of the texture that the old UVs fill, so that margin and density come out right."""
-        held = mesh_bridge.read_uvs(self.selection)
-        if held is None or not np.isfinite(held).all():
-            self.selection.warnings.append("There were no UVs whose place could be kept")
-            return
-        self.bounds = bounds_of(held, self.settings["texture_size"])
+        self.bounds, why_not = bounds_to_keep(mesh_bridge.read_uvs(self.selection), self.settings["texture_size"])
         if self.bounds is None:
-            self.selection.warnings.append("The old UVs fill no rectangle; the whole square was used")
-            return
-        self.native["texture_size"] = self.bounds.pixels
+            self.selection.warnings.append(why_not)
+        else:
+            self.native["texture_size"] = self.bounds.pixels
 
     @property
     def title(self):
@@ -140,13 +136,15 @@ class Bounds:
     pixels: tuple
 
 
-def bounds_of(uv, texture_size):
-    """The rectangle that UVs fill, in whole pixels; None where it is too small to pack into."""
+def bounds_to_keep(uv, texture_size):
+    """The rectangle that UVs (n, 2) fill, in whole pixels, and None; or None and why there is nothing to pack into."""
+    if uv is None or not np.isfinite(uv).all():
+        return None, "There were no UVs whose place could be kept"
     low, high = uv.min(axis=0).astype(float), uv.max(axis=0).astype(float)
     if (high - low).min() < SMALLEST_BOUNDS:
-        return None
+        return None, "The old UVs fill no rectangle; the whole square was used"
     pixels = np.maximum(1, np.floor((high - low) * texture_size)).astype(int)
-    return Bounds(low, pixels / texture_size, (int(pixels[0]), int(pixels[1])))
+    return Bounds(low, pixels / texture_size, (int(pixels[0]), int(pixels[1]))), None
 
 
 def placed(uv, bounds):

@@ -109,7 +109,10 @@ def torus(segments, sides, tube=0.4):
     radius = 1 + tube * np.cos(about)
     positions = np.stack([radius * np.cos(around), radius * np.sin(around), tube * np.sin(about)], axis=-1)
     triangles = []
-    at = lambda i, j: (i % segments) * sides + j % sides  # noqa: E731
+
+    def at(i, j):
+        return (i % segments) * sides + j % sides
+
     for i in range(segments):
         for j in range(sides):
             if i % 2 == 0:

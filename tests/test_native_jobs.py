@@ -184,11 +184,11 @@ def test_ctrl_c_interrupts():
     code = """
 import _thread, threading, time, conftest, ble_unwrap_native as n
 job = n.Job()
-mesh = conftest.sphere(256, 256)
+mesh = conftest.sphere(768, 768)
 
 def interrupt():
     while job.progress() == 0:
-        time.sleep(0.01)
+        time.sleep(0.001)
     _thread.interrupt_main()
 
 threading.Thread(target=interrupt).start()

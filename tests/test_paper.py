@@ -42,7 +42,7 @@ def test_neither_bends_a_flat_rectangle(rows):
     assert of["BLE (default)"] < 1 + 1e-6 and of["Isomap"] < 1 + 1e-6
 
 
-# Share of the triangles that the printed model turns over; native/paper/README.md have
+# Share of the triangles that the printed model turns over; native/paper/README.md has
 # the same at 1,000 vertices: face 5 %, hemisphere 11 %, camel head 23 %, L 45 %, rectangle 50 %.
 PRINTED_FLIPS = {
     "face": (0.01, 0.2),

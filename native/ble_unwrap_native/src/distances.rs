@@ -115,9 +115,8 @@ const MOST_NEIGHBOURS: usize = 100_000;
 /// -----
 /// An estimate of distances on the surface that the points sample: along zigzags, which are 3 % too long on average for
 /// random points with 12 neighbours and 0.9 % with 24, however many points, and through space where edges leave the
-/// surface. Coincident
-/// points count as one place and are at distance 0. Across a bridge everything passes through its two ends. The
-/// triangle inequality holds to rounding. The graph takes O(n log n) in few dimensions, a source O(n log n) or what lies
+/// surface. Coincident points count as one place and are at distance 0. Across a bridge everything passes through its two
+/// ends. The triangle inequality holds to rounding. The graph takes O(n log n) in few dimensions, a source O(n log n) or what lies
 /// within the radius, and a row of 8n bytes.
 ///
 /// Source: Bernoulli Embedding Model and Its Application in Texture Mapping, 2006, section 5.1; Tenenbaum, de Silva,

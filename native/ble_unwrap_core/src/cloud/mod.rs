@@ -42,11 +42,11 @@ mod sample;
 mod split;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
 
 use nalgebra::Point2;
 use rayon::prelude::*;
 
+use crate::pipeline::Clock;
 use crate::progress::{Cancelled, Progress, Stage};
 use crate::settings::Settings;
 
@@ -84,9 +84,10 @@ const GRAPH_WORK: f64 = 0.2;
 ///
 /// Not guaranteed: the measured stretch to better than some thousandths: where the points themselves are charted it
 /// comes out up to 0.005 too low (a hemisphere of 2,500 points: 1.017 with 12 neighbours, 1.022 measured with 30, while
-/// its least is 1.021), since a mean over a neighbourhood does not see positions waver. Nor freedom from folds and overlaps narrower than the spacing of points (those found are counted), the
-/// fewest charts, the connectivity a person would see: two sheets nearer to each other than their points are grow
-/// together, and a piece sampled with gaps falls apart. More `neighbours` bridge wider gaps.
+/// its least is 1.021), since a mean over a neighbourhood does not see positions waver. Nor freedom from folds and
+/// overlaps narrower than the spacing of points (those found are counted), the fewest charts, the connectivity a person
+/// would see: two sheets nearer to each other than their points are grow together, and a piece sampled with gaps falls
+/// apart. More `neighbours` bridge wider gaps.
 ///
 /// Of the settings those of meshes' connectivity and stretch minimisation have no meaning here. `coarse` is whether
 /// large pieces are charted by cells.
@@ -130,7 +131,7 @@ pub fn unwrap_points(
     progress.enter(Stage::Verify);
     let mut atlas = assemble(&cloud, &pieces, &layout, settings);
     clock.lap("measure");
-    atlas.report.seconds = clock.laps;
+    atlas.report.seconds = clock.into_laps();
     progress.enter(Stage::Done);
     Ok(atlas)
 }
@@ -293,22 +294,4 @@ fn warnings(report: &CloudReport, pieces: &[PieceCharts]) -> Vec<String> {
         ));
     }
     list
-}
-
-/// Seconds of each stage, for the report; nothing is decided by them.
-struct Clock {
-    last: Instant,
-    laps: Vec<(&'static str, f64)>,
-}
-
-impl Clock {
-    fn new() -> Self {
-        Self { last: Instant::now(), laps: Vec::new() }
-    }
-
-    fn lap(&mut self, name: &'static str) {
-        let now = Instant::now();
-        self.laps.push((name, (now - self.last).as_secs_f64()));
-        self.last = now;
-    }
 }

@@ -452,8 +452,9 @@ impl LandmarkModel {
     /// numbers a point, its coordinates and its intercept (0 for the printed model).
     ///
     /// Points are independent, so the bytes are the same for any number of threads. Each is the maximum of its
-    /// likelihood, to 1e-10 where that has one; finite always. Not guaranteed unless [`LandmarkModel::anchored`]: the place of
-    /// points some 8√σ and more from all landmarks, of which the nearest then outweighs the rest. O(kq²) a point: about 3 µs for k = 100 in the plane.
+    /// likelihood, to 1e-10 where that has one; finite always. Not guaranteed unless [`LandmarkModel::anchored`]: the
+    /// place of points some 8√σ and more from all landmarks, of which the nearest then outweighs the rest. O(kq²) a
+    /// point: about 5 µs anchored, for k = 100 in the plane (`benches/README.md`).
     ///
     /// # Errors
     /// Cancelled.

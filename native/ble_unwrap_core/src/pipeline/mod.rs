@@ -94,6 +94,7 @@ impl Clock {
         self.laps.push((name, (now - self.last).as_secs_f64()));
         self.last = now;
     }
+
     pub(crate) fn into_laps(self) -> Vec<(&'static str, f64)> {
         self.laps
     }

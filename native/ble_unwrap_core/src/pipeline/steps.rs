@@ -37,8 +37,13 @@ impl<'a> Steps<'a> {
         if self.mesh.vertex_count() > self.settings.together_max {
             return Ok(None);
         }
+        self.distances_between_all().map(Some)
+    }
+
+    /// Distances between all vertices: n×n of them.
+    pub(crate) fn distances_between_all(&self) -> Result<LandmarkDistances, Cancelled> {
         let all: Vec<_> = self.mesh.vertices().collect();
-        geodesics::geodesic_distances(self.mesh, &all, self.settings.geodesics.metric, self.progress).map(Some)
+        geodesics::geodesic_distances(self.mesh, &all, self.settings.geodesics.metric, self.progress)
     }
 
     /// Landmarks by likelihood, the rest by regression, in the standard pose.

@@ -301,8 +301,7 @@ fn distances(steps: &Steps<'_>, settings: &Settings, progress: &Progress) -> Res
         return Err(FlattenError::TooManyLandmarks { landmarks });
     }
     if all {
-        let every: Vec<_> = mesh.vertices().collect();
-        return Ok(geodesics::geodesic_distances(mesh, &every, asked.metric, progress)?);
+        return Ok(steps.distances_between_all()?);
     }
     Ok(geodesics::landmark_distances(mesh, asked, progress)?)
 }
