@@ -115,16 +115,18 @@ fn step(piece: &Piece, settings: &Settings, progress: &Progress) -> Result<(Step
     if let Some(chart) = attempt.run(&mut rungs)? {
         return Ok((Step::Accept(Box::new(chart)), rungs));
     }
-    let parts = if splits < MOST_SPECTRAL_SPLITS {
-        rungs.take(Rung::Split);
-        let (distances, analysis) = attempt.analysis()?;
-        let cuts = &settings.segmentation;
-        segmentation::segment(&patch.mesh, &patch.polygon, distances, analysis, splits == 0, cuts, progress)?
-    } else {
-        rungs.take(Rung::Bisect);
-        segmentation::bisect(&patch.mesh, &patch.polygon)
-    };
-    Ok((Step::Split(patch.split(&parts.label, parts.parts)), rungs))
+    let parts = attempt.split(splits, &mut rungs)?;
+    Ok((Step::Split(parts), rungs))
+}
+
+/// The parts of a patch that is known not to be one chart, and that is not one polygon.
+pub(super) fn split(
+    patch: &Patch,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Progress,
+) -> Result<Vec<Patch>, Cancelled> {
+    Attempt::new(patch, settings, progress).split(1, rungs)
 }
 
 /// One patch under trial: its topology, and its distances once somebody asks.
@@ -147,6 +149,21 @@ impl<'a> Attempt<'a> {
         }
         let fresh = analyse(self.patch, self.settings, self.progress)?;
         Ok(self.measured.get_or_init(|| fresh))
+    }
+
+    /// Parts by spectral segmentation, or halves after that has been tried so often; `splits` is 0 for a component.
+    fn split(&self, splits: u32, rungs: &mut Rungs) -> Result<Vec<Patch>, Cancelled> {
+        let (patch, progress) = (self.patch, self.progress);
+        let parts = if splits < MOST_SPECTRAL_SPLITS {
+            rungs.take(Rung::Split);
+            let (distances, analysis) = self.analysis()?;
+            let cuts = &self.settings.segmentation;
+            segmentation::segment(&patch.mesh, &patch.polygon, distances, analysis, splits == 0, cuts, progress)?
+        } else {
+            rungs.take(Rung::Bisect);
+            segmentation::bisect(&patch.mesh, &patch.polygon)
+        };
+        Ok(patch.split(&parts.label, parts.parts))
     }
 
     /// A chart whatever its stretch, for a patch that cannot be split.

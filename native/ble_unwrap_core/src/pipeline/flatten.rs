@@ -82,6 +82,22 @@ pub(super) fn flatten(
     recover(trial.flatten(distances, Some(settings.stretch_limit), rungs))
 }
 
+/// Flattens a patch of genus 0 with a boundary from a start in the plane near its minimum. `None` where the limit
+/// is out of reach.
+pub(super) fn flatten_from(
+    patch: &Patch,
+    start: &[Point2<f64>],
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Progress,
+) -> Result<Option<Flat>, Cancelled> {
+    if let Some(flat) = isometric(patch, rungs) {
+        return Ok(Some(flat));
+    }
+    let trial = Trial { patch, rest: RestTriangle::of_mesh(&patch.mesh), settings, progress };
+    recover(trial.flatten_from(start, Some(settings.stretch_limit), Rung::Prolonged, rungs))
+}
+
 /// Flattens a patch that is one polygon, which cannot be split: as well as it goes, and at worst on a
 /// circle, where every triangulation of a polygon is free of flips.
 pub(super) fn flatten_polygon(
@@ -156,30 +172,69 @@ impl Trial<'_> {
         limit: Option<f64>,
         rungs: &mut Rungs,
     ) -> Result<Option<Flat>, StretchError> {
+        match self.embed(distances)? {
+            Some(start) => self.flatten_from(&start, limit, Rung::Embedding, rungs),
+            None => self.flatten_apart(limit, rungs),
+        }
+    }
+
+    /// `rung` is where the start comes from.
+    fn flatten_from(
+        &self,
+        start: &[Point2<f64>],
+        limit: Option<f64>,
+        rung: Rung,
+        rungs: &mut Rungs,
+    ) -> Result<Option<Flat>, StretchError> {
         let mesh = &self.patch.mesh;
-        if let Some(start) = self.embed(distances)? {
-            if limit.is_some() && self.folded_share(&start) > MOST_FOLDED {
-                return Ok(None);
-            }
-            let (uv, how) = stretch::make_injective(mesh, &self.rest, &start, self.progress)?;
-            rungs.take(match how {
-                Injective::AlreadyWas => Rung::Embedding,
-                Injective::FoldoverFree => Rung::FoldoverFree,
-                Injective::TutteShape => Rung::TutteShape,
-                Injective::TutteCircle => Rung::TutteCircle,
-            });
-            if limit.is_some() && stretch::l2_stretch(mesh, &self.rest, &uv) > HOPELESS_START {
-                return Ok(None);
-            }
-            let Some(best) = self.minimise(&uv, limit, false)? else { return Ok(None) };
-            if stretch::boundary_is_simple(mesh, &best.uv) {
-                return Ok(self.judge(best.uv, limit));
-            }
-            if limit.is_some_and(|limit| best.l2 > limit) {
-                return Ok(None);
-            }
+        let t0 = std::time::Instant::now();
+        if mesh.face_count() > 3000 {
+            eprintln!("T folded {:.4}", self.folded_share(start));
+        }
+        if limit.is_some() && self.folded_share(start) > MOST_FOLDED {
+            return Ok(None);
+        }
+        let (uv, how) = stretch::make_injective(mesh, &self.rest, start, self.progress)?;
+        rungs.take(match how {
+            Injective::AlreadyWas => rung,
+            Injective::FoldoverFree => Rung::FoldoverFree,
+            Injective::TutteShape => Rung::TutteShape,
+            Injective::TutteCircle => Rung::TutteCircle,
+        });
+        let t2 = t0.elapsed().as_secs_f64();
+        if mesh.face_count() > 3000 {
+            eprintln!("T inj {:.2} {how:?} l2 {}", t2, stretch::l2_stretch(mesh, &self.rest, &uv));
+        }
+        let hopeless = || stretch::l2_stretch(mesh, &self.rest, &uv) > HOPELESS_START;
+        if limit.is_some() && rung != Rung::Prolonged && hopeless() {
+            return Ok(None);
+        }
+        let best = self.minimise(&uv, limit, false)?;
+        if mesh.face_count() > 3000 {
+            eprintln!(
+                "T trial {rung:?} f {} inj {:.2} {how:?} min {:.2} it {:?} l2 {:?}",
+                mesh.face_count(),
+                t2,
+                t0.elapsed().as_secs_f64() - t2,
+                best.as_ref().map(|b| b.iterations),
+                best.as_ref().map(|b| b.l2)
+            );
+        }
+        let Some(best) = best else { return Ok(None) };
+        if mesh.face_count() > 3000 { eprintln!("T simple best {} start {} raw {} p99 {}", stretch::boundary_is_simple(mesh, &best.uv), stretch::boundary_is_simple(mesh, &uv), stretch::boundary_is_simple(mesh, start), self.p99_stretch(&best.uv)); }
+        if stretch::boundary_is_simple(mesh, &best.uv) {
+            return Ok(self.judge(best.uv, limit));
+        }
+        if limit.is_some_and(|limit| best.l2 > limit) {
+            return Ok(None);
         }
         // The free boundary ran over itself: start without overlap and keep it so.
+        if stretch::boundary_is_simple(mesh, &uv)
+            && let Some(best) = self.minimise(&uv, limit, true)?
+            && stretch::boundary_is_simple(mesh, &best.uv)
+        {
+            return Ok(self.judge(best.uv, limit));
+        }
         self.flatten_apart(limit, rungs)
     }
 

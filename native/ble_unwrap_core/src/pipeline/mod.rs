@@ -10,6 +10,7 @@ mod component;
 mod finish;
 mod flatten;
 mod merge;
+mod prolong;
 mod rungs;
 mod tally;
 

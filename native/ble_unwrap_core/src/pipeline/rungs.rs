@@ -7,9 +7,11 @@ pub enum Rung {
     Plane,
     /// A developable piece, unfolded isometrically.
     Unfold,
+    /// A chart of the coarse mesh, carried over: no flip to clear.
+    Prolonged,
     /// Bernoulli logistic embedding, no flip to clear.
     Embedding,
-    /// The embedding, its flips cleared by the foldover-free energy.
+    /// Either of these, its flips cleared by the foldover-free energy.
     FoldoverFree,
     /// Tutte's embedding in the convexified outline of the embedding.
     TutteShape,
@@ -32,9 +34,10 @@ pub enum Rung {
 }
 
 impl Rung {
-    const ALL: [Self; 13] = [
+    const ALL: [Self; 14] = [
         Self::Plane,
         Self::Unfold,
+        Self::Prolonged,
         Self::Embedding,
         Self::FoldoverFree,
         Self::TutteShape,
@@ -54,6 +57,7 @@ impl Rung {
         match self {
             Self::Plane => "plane",
             Self::Unfold => "unfold",
+            Self::Prolonged => "prolonged",
             Self::Embedding => "embedding",
             Self::FoldoverFree => "foldover_free",
             Self::TutteShape => "tutte_shape",

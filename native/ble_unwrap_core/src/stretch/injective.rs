@@ -3,13 +3,18 @@
 use nalgebra::Point2;
 
 use super::StretchError;
-use super::foldover_free::foldover_free;
+use super::foldover_free::{foldover_free, foldover_free_near, is_collapsed};
 use super::measure::{plane_area, rescale_to_equal_area};
 use super::overlap::first_flip;
 use super::tutte::{TutteBoundary, tutte_attempt};
 use crate::distortion::RestTriangle;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
+
+/// Up to this share of flipped triangles they are cleared in their neighbourhoods of so many rings,
+const FEW_FLIPS: f64 = 0.02;
+/// the second only where the first was too narrow.
+const NEIGHBOURHOODS: [usize; 2] = [3, 8];
 
 /// How a map came to have no flips; each rung of the ladder is tried only if those before it failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -49,7 +54,8 @@ pub fn make_injective(
     );
     progress.check()?;
     if first_flip(mesh, start).is_none() {
-        return Ok((start.to_vec(), Injective::AlreadyWas));
+        let better = clear_locally(mesh, rest, start, progress)?;
+        return Ok((better.unwrap_or_else(|| start.to_vec()), Injective::AlreadyWas));
     }
     let finite = start.iter().all(|p| p.x.is_finite() && p.y.is_finite());
     let mut start = start.to_vec();
@@ -59,6 +65,9 @@ pub fn make_injective(
             if first_flip(mesh, &start).is_none() {
                 return Ok((start, Injective::AlreadyWas));
             }
+        }
+        if let Some(uv) = clear_locally(mesh, rest, &start, progress)? {
+            return Ok((uv, Injective::FoldoverFree));
         }
         if let Some(uv) = foldover_free(mesh, rest, &start, progress)? {
             return Ok((uv, Injective::FoldoverFree));
@@ -80,6 +89,26 @@ pub fn make_injective(
         }
     }
     Err(StretchError::NotInjective)
+}
+
+/// Clears a few flipped or collapsed triangles, each in its neighbourhood; `None` if there are none, too many, or they
+/// resist.
+fn clear_locally(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    start: &[Point2<f64>],
+    progress: &Progress,
+) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
+    let count = mesh.faces().filter(|&f| is_collapsed(mesh, rest, start, f)).count();
+    if count == 0 || count as f64 > FEW_FLIPS * mesh.face_count() as f64 {
+        return Ok(None);
+    }
+    for rings in NEIGHBOURHOODS {
+        if let Some(uv) = foldover_free_near(mesh, rest, start, rings, progress)? {
+            return Ok(Some(uv));
+        }
+    }
+    Ok(None)
 }
 
 #[cfg(test)]

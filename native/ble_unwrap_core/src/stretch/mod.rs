@@ -23,6 +23,7 @@ mod grid;
 mod injective;
 mod line_search;
 mod measure;
+mod neighbourhood;
 mod newton;
 mod overlap;
 mod system;

@@ -4,11 +4,13 @@ use nalgebra::Point2;
 
 use super::barrier::Barrier;
 use super::energy::StretchEnergy;
+use super::measure::{plane_area, surface_area};
+use super::neighbourhood::Neighbourhood;
 use super::overlap::{boundary_is_simple, first_flip};
 use super::system::{ChartSystem, advance};
 use super::{MinimiseOptions, Minimised, StretchError, StretchSettings};
-use crate::distortion::RestTriangle;
-use crate::mesh::TriMesh;
+use crate::distortion::{RestTriangle, squared_stretch};
+use crate::mesh::{FaceId, TriMesh};
 use crate::progress::Progress;
 
 /// Armijo's constant: a step must win this share of what its slope promises.
@@ -28,6 +30,17 @@ const ABANDON_AFTER: usize = 5;
 /// A chart is abandoned if so many times its last gain would not bring it under the limit.
 const ABANDON_GAINS: f64 = 4.0;
 
+/// A triangle of more than this squared stretch is among the worst,
+const WORST: f64 = 3.0;
+/// which are mended first if they are at most this share of all,
+const MOST_WORST: f64 = 0.05;
+/// so many rings around them,
+const WORST_RINGS: usize = 4;
+/// by so many steps at most, or until one gains less than this share.
+const WORST_STEPS: usize = 12;
+/// See [`WORST_STEPS`].
+const WORST_TOLERANCE: f64 = 1e-2;
+
 /// Minimises over all vertices; `start` has been checked to be positive, and simple if that is to
 /// be kept.
 ///
@@ -42,10 +55,17 @@ pub(super) fn minimise(
     options: &MinimiseOptions,
     progress: &Progress,
 ) -> Result<Minimised, StretchError> {
-    let mut descent = Descent::new(mesh, rest, start, options.keep_boundary_simple)?;
-    let mut result = Minimised { uv: Vec::new(), l2: 0.0, iterations: 0, abandoned: false, converged: false };
+    let mut uv = start.to_vec();
+    let mut scratch = uv.clone();
+    let scale = (surface_area(rest) / plane_area(mesh, &uv)).sqrt();
+    rescale(mesh, &mut uv, scale, &mut scratch, options.keep_boundary_simple);
     let energy = StretchEnergy::new(settings.dirichlet_weight);
     let warm = StretchEnergy::new(settings.dirichlet_weight.max(0.5));
+    if !options.keep_boundary_simple {
+        relax_worst(mesh, rest, &mut uv, &warm, progress)?;
+    }
+    let mut descent = Descent::new(mesh, rest, uv, Vec::new(), options.keep_boundary_simple)?;
+    let mut result = Minimised { uv: Vec::new(), l2: 0.0, iterations: 0, abandoned: false, converged: false };
     let mut l2 = descent.system.stretch_sums(&descent.uv).l2();
     for iteration in 0..settings.max_iterations {
         progress.check()?;
@@ -75,30 +95,62 @@ pub(super) fn minimise(
     Ok(result)
 }
 
+/// Lowers the energy around the triangles that are stretched far more than the others, each neighbourhood by itself:
+/// one that is nearly flipped shortens the steps of all. Nothing where there are none, or too many.
+fn relax_worst(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    uv: &mut [Point2<f64>],
+    energy: &StretchEnergy,
+    progress: &Progress,
+) -> Result<(), StretchError> {
+    let stretched =
+        |f: FaceId| squared_stretch(&rest[f.index()].jacobian(mesh.triangle(f).map(|v| uv[v.index()]))) > WORST;
+    let bad: Vec<bool> = mesh.faces().map(stretched).collect();
+    let count = bad.iter().filter(|b| **b).count();
+    if count == 0 || count as f64 > MOST_WORST * bad.len() as f64 {
+        return Ok(());
+    }
+    let near = Neighbourhood::new(mesh, rest, &bad, WORST_RINGS);
+    let mut descent = Descent::new(&near.mesh, &near.rest, near.read(uv), near.pinned.clone(), false)?;
+    for _ in 0..WORST_STEPS {
+        progress.check()?;
+        let Some((before, after)) = descent.step(&near.mesh, energy) else { break };
+        if before - after <= WORST_TOLERANCE * after {
+            break;
+        }
+    }
+    let mut relaxed = uv.to_vec();
+    near.write(&descent.uv, &mut relaxed);
+    if first_flip(mesh, &relaxed).is_none() {
+        uv.copy_from_slice(&relaxed);
+    }
+    Ok(())
+}
+
 /// Everything one Newton step works on.
 struct Descent {
     system: ChartSystem,
     barrier: Option<Barrier>,
+    /// Vertices that stay; none if empty.
+    pinned: Vec<bool>,
     uv: Vec<Point2<f64>>,
     trial: Vec<Point2<f64>>,
     direction: Vec<f64>,
 }
 
 impl Descent {
+    /// From a map at the scale it is to be minimised at.
     fn new(
         mesh: &TriMesh,
         rest: &[RestTriangle],
-        start: &[Point2<f64>],
+        uv: Vec<Point2<f64>>,
+        pinned: Vec<bool>,
         keep_boundary_simple: bool,
     ) -> Result<Self, StretchError> {
-        let mut uv = start.to_vec();
-        let system = ChartSystem::new(mesh, rest)?;
-        let mut trial = uv.clone();
-        // The system's areas sum to one, and so do its determinants' if the areas are equal.
-        let scale = 1.0 / system.stretch_sums(&uv).area.sqrt();
-        rescale(mesh, &mut uv, scale, &mut trial, keep_boundary_simple);
         let barrier = keep_boundary_simple.then(|| Barrier::new(mesh, rest));
-        Ok(Self { system, barrier, direction: vec![0.0; 2 * uv.len()], uv, trial })
+        let (trial, direction) = (uv.clone(), vec![0.0; 2 * uv.len()]);
+        Ok(Self { system: ChartSystem::new(mesh, rest)?, barrier, pinned, direction, uv, trial })
     }
 
     fn value(&self, energy: &StretchEnergy, uv: &[Point2<f64>]) -> f64 {
@@ -116,7 +168,7 @@ impl Descent {
         if let Some(barrier) = &self.barrier {
             barrier.assemble(&self.uv, &mut self.system);
         }
-        let slope = self.system.solve(&mut self.direction)?;
+        let slope = self.system.solve_pinned(&self.pinned, &mut self.direction)?;
         let mut step = (SAFETY * self.system.first_flip(&self.uv, &self.direction)).min(1.0);
         if let Some(barrier) = &self.barrier {
             step = step.min(SAFETY * barrier.first_contact(&self.uv, &self.direction, step / SAFETY));
@@ -224,7 +276,7 @@ mod tests {
         let rest = RestTriangle::of_mesh(&mesh);
         let start = tutte(&mesh, &rest);
         for (keep, w) in [(false, 0.0), (false, 0.5), (true, 0.05)] {
-            let mut descent = Descent::new(&mesh, &rest, &start, keep).expect("analysis");
+            let mut descent = Descent::new(&mesh, &rest, start.clone(), Vec::new(), keep).expect("analysis");
             let energy = StretchEnergy::new(w);
             let mut last = descent.value(&energy, &descent.uv);
             let mut steps = 0;
