@@ -16,9 +16,9 @@ use crate::segmentation;
 use crate::settings::Settings;
 
 use super::charting::{self, Charting};
-use super::flatten;
+use super::flatten::{self, Polished};
 use super::merge::{self, Which};
-use super::prolong::prolong;
+use super::prolong::{Prolonged, prolong};
 use super::rungs::Rungs;
 use super::tally::Tally;
 
@@ -237,9 +237,24 @@ impl<'a> OnCoarse<'a> {
 
     fn step(&self, part: &Part, rungs: &mut Rungs, progress: &Progress) -> Result<Outcome, Cancelled> {
         progress.check()?;
-        let Some(prolonged) = prolong(&self.coarse, &part.guide, &part.patch) else { return Ok(Outcome::Fine) };
-        if let Some(flat) = flatten::flatten_from(&prolonged.patch, &prolonged.start, self.settings, rungs, progress)? {
-            return Ok(Outcome::Accept(Box::new(flat.into_chart(prolonged.patch))));
+        let mut guide = part.guide.clone();
+        for again in [false, true] {
+            if again {
+                guide = flatten::spread(&guide, self.settings, progress)?;
+            }
+            let Some(Prolonged { patch, start }) = prolong(&self.coarse, &guide, &part.patch) else {
+                return Ok(Outcome::Fine);
+            };
+            match flatten::polish(&patch, &start, self.settings, rungs, progress)? {
+                Polished::Chart(flat) => return Ok(Outcome::Accept(Box::new(flat.into_chart(patch)))),
+                Polished::Refused => break,
+                Polished::Overlaps if again => {
+                    if let Some(flat) = flatten::flatten_apart(&patch, self.settings, rungs, progress)? {
+                        return Ok(Outcome::Accept(Box::new(flat.into_chart(patch))));
+                    }
+                }
+                Polished::Overlaps => {}
+            }
         }
         let mut faces = part.guide.patch.faces.clone();
         if faces.len() <= LEAST_COARSE_FACES || part.patch.faces.len() <= LEAST_FINE_FACES {

@@ -11,7 +11,7 @@ use crate::geodesics::LandmarkDistances;
 use crate::mesh::FaceId;
 use crate::progress::{Cancelled, Progress};
 use crate::settings::Settings;
-use crate::stretch::{self, Injective, MinimiseOptions, Minimised, StretchError, TutteBoundary};
+use crate::stretch::{self, BOUNDARY_REACH, Injective, MinimiseOptions, Minimised, StretchError, TutteBoundary};
 
 use super::rungs::{Rung, Rungs};
 
@@ -30,6 +30,8 @@ const MOST_FOLDED: f64 = 0.25;
 /// A start without flips that is stretched more than this is not worth minimising: of the trials on a model
 /// with many holes, where starts are worst, none that began above 3 came under an L2 of 1.1; this leaves room.
 const HOPELESS_START: f64 = 4.0;
+/// See [`spread`]: in lengths of the coarse boundary's edges.
+const WIDE_REACH: f64 = 1.0;
 
 /// A patch flattened without flips and without overlap.
 pub(super) struct Flat {
@@ -82,20 +84,44 @@ pub(super) fn flatten(
     recover(trial.flatten(distances, Some(settings.stretch_limit), rungs))
 }
 
-/// Flattens a patch of genus 0 with a boundary from a start in the plane near its minimum. `None` where the limit
-/// is out of reach.
-pub(super) fn flatten_from(
+/// What became of a start near the minimum.
+pub(super) enum Polished {
+    Chart(Flat),
+    /// Under the limit but for an overlap of its boundary, which the start already had.
+    Overlaps,
+    Refused,
+}
+
+/// Flattens a patch of genus 0 with a boundary from a start in the plane near its minimum.
+pub(super) fn polish(
     patch: &Patch,
     start: &[Point2<f64>],
     settings: &Settings,
     rungs: &mut Rungs,
     progress: &Progress,
-) -> Result<Option<Flat>, Cancelled> {
+) -> Result<Polished, Cancelled> {
     if let Some(flat) = isometric(patch, rungs) {
-        return Ok(Some(flat));
+        return Ok(Polished::Chart(flat));
     }
     let trial = Trial { patch, rest: RestTriangle::of_mesh(&patch.mesh), settings, progress };
-    recover(trial.flatten_from(start, Some(settings.stretch_limit), Rung::Prolonged, rungs))
+    match trial.polish(start, Some(settings.stretch_limit), Rung::Prolonged, rungs) {
+        Ok(polished) => Ok(polished),
+        Err(StretchError::Cancelled(c)) => Err(c),
+        Err(_) => Ok(Polished::Refused),
+    }
+}
+
+/// A chart whose boundary keeps the length of its edges from itself, where it can: what is prolonged from it has room
+/// for the detours of the fine boundary. The chart as it was where that fails.
+pub(super) fn spread(chart: &Chart, settings: &Settings, progress: &Progress) -> Result<Chart, Cancelled> {
+    let patch = &chart.patch;
+    let trial = Trial { patch, rest: RestTriangle::of_mesh(&patch.mesh), settings, progress };
+    match trial.minimise(&chart.uv, None, Some(WIDE_REACH)) {
+        Ok(Some(spread)) => Ok(Chart { patch: patch.clone(), uv: spread.uv, l2: spread.l2 }),
+        Ok(None) => Ok(chart.clone()),
+        Err(StretchError::Cancelled(c)) => Err(c),
+        Err(_) => Ok(chart.clone()),
+    }
 }
 
 /// Flattens a patch that is one polygon, which cannot be split: as well as it goes, and at worst on a
@@ -172,27 +198,27 @@ impl Trial<'_> {
         limit: Option<f64>,
         rungs: &mut Rungs,
     ) -> Result<Option<Flat>, StretchError> {
-        match self.embed(distances)? {
-            Some(start) => self.flatten_from(&start, limit, Rung::Embedding, rungs),
-            None => self.flatten_apart(limit, rungs),
+        if let Some(start) = self.embed(distances)? {
+            match self.polish(&start, limit, Rung::Embedding, rungs)? {
+                Polished::Chart(flat) => return Ok(Some(flat)),
+                Polished::Refused => return Ok(None),
+                Polished::Overlaps => {}
+            }
         }
+        self.flatten_apart(limit, rungs)
     }
 
-    /// `rung` is where the start comes from.
-    fn flatten_from(
+    /// From a start in the plane; `rung` is where it comes from.
+    fn polish(
         &self,
         start: &[Point2<f64>],
         limit: Option<f64>,
         rung: Rung,
         rungs: &mut Rungs,
-    ) -> Result<Option<Flat>, StretchError> {
+    ) -> Result<Polished, StretchError> {
         let mesh = &self.patch.mesh;
-        let t0 = std::time::Instant::now();
-        if mesh.face_count() > 3000 {
-            eprintln!("T folded {:.4}", self.folded_share(start));
-        }
         if limit.is_some() && self.folded_share(start) > MOST_FOLDED {
-            return Ok(None);
+            return Ok(Polished::Refused);
         }
         let (uv, how) = stretch::make_injective(mesh, &self.rest, start, self.progress)?;
         rungs.take(match how {
@@ -201,41 +227,26 @@ impl Trial<'_> {
             Injective::TutteShape => Rung::TutteShape,
             Injective::TutteCircle => Rung::TutteCircle,
         });
-        let t2 = t0.elapsed().as_secs_f64();
-        if mesh.face_count() > 3000 {
-            eprintln!("T inj {:.2} {how:?} l2 {}", t2, stretch::l2_stretch(mesh, &self.rest, &uv));
-        }
         let hopeless = || stretch::l2_stretch(mesh, &self.rest, &uv) > HOPELESS_START;
         if limit.is_some() && rung != Rung::Prolonged && hopeless() {
-            return Ok(None);
+            return Ok(Polished::Refused);
         }
-        let best = self.minimise(&uv, limit, false)?;
-        if mesh.face_count() > 3000 {
-            eprintln!(
-                "T trial {rung:?} f {} inj {:.2} {how:?} min {:.2} it {:?} l2 {:?}",
-                mesh.face_count(),
-                t2,
-                t0.elapsed().as_secs_f64() - t2,
-                best.as_ref().map(|b| b.iterations),
-                best.as_ref().map(|b| b.l2)
-            );
+        let judged = |uv| self.judge(uv, limit).map_or(Polished::Refused, Polished::Chart);
+        let Some(free) = self.minimise(&uv, limit, None)? else { return Ok(Polished::Refused) };
+        if stretch::boundary_is_simple(mesh, &free.uv) {
+            return Ok(judged(free.uv));
         }
-        let Some(best) = best else { return Ok(None) };
-        if mesh.face_count() > 3000 { eprintln!("T simple best {} start {} raw {} p99 {}", stretch::boundary_is_simple(mesh, &best.uv), stretch::boundary_is_simple(mesh, &uv), stretch::boundary_is_simple(mesh, start), self.p99_stretch(&best.uv)); }
-        if stretch::boundary_is_simple(mesh, &best.uv) {
-            return Ok(self.judge(best.uv, limit));
-        }
-        if limit.is_some_and(|limit| best.l2 > limit) {
-            return Ok(None);
+        if limit.is_some_and(|limit| free.l2 > limit) {
+            return Ok(Polished::Refused);
         }
         // The free boundary ran over itself: start without overlap and keep it so.
-        if stretch::boundary_is_simple(mesh, &uv)
-            && let Some(best) = self.minimise(&uv, limit, true)?
-            && stretch::boundary_is_simple(mesh, &best.uv)
-        {
-            return Ok(self.judge(best.uv, limit));
+        if !stretch::boundary_is_simple(mesh, &uv) {
+            return Ok(Polished::Overlaps);
         }
-        self.flatten_apart(limit, rungs)
+        Ok(match self.minimise(&uv, limit, Some(BOUNDARY_REACH))? {
+            Some(apart) if stretch::boundary_is_simple(mesh, &apart.uv) => judged(apart.uv),
+            _ => Polished::Refused,
+        })
     }
 
     fn flatten_apart(&self, limit: Option<f64>, rungs: &mut Rungs) -> Result<Option<Flat>, StretchError> {
@@ -245,7 +256,7 @@ impl Trial<'_> {
             return Ok(None);
         };
         rungs.take(Rung::TutteCircle);
-        let Some(best) = self.minimise(&circle, limit, true)? else { return Ok(None) };
+        let Some(best) = self.minimise(&circle, limit, Some(BOUNDARY_REACH))? else { return Ok(None) };
         Ok(if stretch::boundary_is_simple(mesh, &best.uv) { self.judge(best.uv, limit) } else { None })
     }
 
@@ -276,9 +287,9 @@ impl Trial<'_> {
         &self,
         start: &[Point2<f64>],
         abandon_above: Option<f64>,
-        keep_boundary_simple: bool,
+        keep_apart: Option<f64>,
     ) -> Result<Option<Minimised>, StretchError> {
-        let options = MinimiseOptions { abandon_above, keep_boundary_simple, seed: self.seed() };
+        let options = MinimiseOptions { abandon_above, keep_apart, seed: self.seed() };
         let (mesh, settings) = (&self.patch.mesh, &self.settings.stretch);
         let best = stretch::minimise_stretch(mesh, &self.rest, start, settings, &options, self.progress)?;
         Ok((!best.abandoned).then_some(best))

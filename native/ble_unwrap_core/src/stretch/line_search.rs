@@ -45,7 +45,7 @@ pub(super) fn minimise(
     let mut result = Minimised { uv: Vec::new(), l2: 0.0, iterations: 0, abandoned: false, converged: false };
     for sweep in 0..settings.max_iterations {
         let before = (sums.energy * sums.area).sqrt();
-        let saved = options.keep_boundary_simple.then(|| uv.clone());
+        let saved = options.keep_apart.map(|_| uv.clone());
         run_sweep(mesh, rest, &mut uv, sums, (options.seed, sweep as u64), true, progress)?;
         if let Some(saved) = saved
             && !boundary_is_simple(mesh, &uv)
@@ -221,7 +221,8 @@ mod tests {
         for sweeps in [1, 2, 5, 20] {
             let settings = StretchSettings { max_iterations: sweeps, tolerance: 0.0, ..StretchSettings::paper() };
             for keep in [false, true] {
-                let options = MinimiseOptions { keep_boundary_simple: keep, seed: 7, ..Default::default() };
+                let options =
+                    MinimiseOptions { keep_apart: keep.then_some(BOUNDARY_REACH), seed: 7, ..Default::default() };
                 let got = minimise_stretch(&mesh, &rest, &start, &settings, &options, &progress).expect("runs");
                 assert_eq!(first_flip(&mesh, &got.uv), None);
                 assert!((got.l2 - l2_stretch(&mesh, &rest, &got.uv)).abs() < 1e-9);

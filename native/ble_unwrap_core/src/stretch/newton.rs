@@ -58,13 +58,13 @@ pub(super) fn minimise(
     let mut uv = start.to_vec();
     let mut scratch = uv.clone();
     let scale = (surface_area(rest) / plane_area(mesh, &uv)).sqrt();
-    rescale(mesh, &mut uv, scale, &mut scratch, options.keep_boundary_simple);
+    rescale(mesh, &mut uv, scale, &mut scratch, options.keep_apart.is_some());
     let energy = StretchEnergy::new(settings.dirichlet_weight);
     let warm = StretchEnergy::new(settings.dirichlet_weight.max(0.5));
-    if !options.keep_boundary_simple {
+    if options.keep_apart.is_none() {
         relax_worst(mesh, rest, &mut uv, &warm, progress)?;
     }
-    let mut descent = Descent::new(mesh, rest, uv, Vec::new(), options.keep_boundary_simple)?;
+    let mut descent = Descent::new(mesh, rest, uv, Vec::new(), options.keep_apart)?;
     let mut result = Minimised { uv: Vec::new(), l2: 0.0, iterations: 0, abandoned: false, converged: false };
     let mut l2 = descent.system.stretch_sums(&descent.uv).l2();
     for iteration in 0..settings.max_iterations {
@@ -112,7 +112,7 @@ fn relax_worst(
         return Ok(());
     }
     let near = Neighbourhood::new(mesh, rest, &bad, WORST_RINGS);
-    let mut descent = Descent::new(&near.mesh, &near.rest, near.read(uv), near.pinned.clone(), false)?;
+    let mut descent = Descent::new(&near.mesh, &near.rest, near.read(uv), near.pinned.clone(), None)?;
     for _ in 0..WORST_STEPS {
         progress.check()?;
         let Some((before, after)) = descent.step(&near.mesh, energy) else { break };
@@ -146,9 +146,9 @@ impl Descent {
         rest: &[RestTriangle],
         uv: Vec<Point2<f64>>,
         pinned: Vec<bool>,
-        keep_boundary_simple: bool,
+        keep_apart: Option<f64>,
     ) -> Result<Self, StretchError> {
-        let barrier = keep_boundary_simple.then(|| Barrier::new(mesh, rest));
+        let barrier = keep_apart.map(|reach| Barrier::new(mesh, rest, reach));
         let (trial, direction) = (uv.clone(), vec![0.0; 2 * uv.len()]);
         Ok(Self { system: ChartSystem::new(mesh, rest)?, barrier, pinned, direction, uv, trial })
     }
@@ -238,8 +238,8 @@ mod tests {
         let start: Vec<_> = (0..mesh.vertex_count())
             .map(|i| mesh.positions()[i].xy() + nalgebra::Vector2::new(shake(2 * i), shake(2 * i + 1)))
             .collect();
-        for keep_boundary_simple in [false, true] {
-            let got = run(&mesh, &start, 1e-8, MinimiseOptions { keep_boundary_simple, ..Default::default() });
+        for keep_apart in [None, Some(BOUNDARY_REACH)] {
+            let got = run(&mesh, &start, 1e-8, MinimiseOptions { keep_apart, ..Default::default() });
             assert!(got.converged && got.l2 < 1.0 + 1e-6, "{got:?}");
         }
         // From a circle, and with a hole.
@@ -275,7 +275,7 @@ mod tests {
         let mesh = hemisphere(10);
         let rest = RestTriangle::of_mesh(&mesh);
         let start = tutte(&mesh, &rest);
-        for (keep, w) in [(false, 0.0), (false, 0.5), (true, 0.05)] {
+        for (keep, w) in [(None, 0.0), (None, 0.5), (Some(BOUNDARY_REACH), 0.05)] {
             let mut descent = Descent::new(&mesh, &rest, start.clone(), Vec::new(), keep).expect("analysis");
             let energy = StretchEnergy::new(w);
             let mut last = descent.value(&energy, &descent.uv);
@@ -331,7 +331,7 @@ mod tests {
         let mesh = ramp();
         let rest = RestTriangle::of_mesh(&mesh);
         let go = |start: &[Point2<f64>], keep_boundary_simple: bool, progress: &Progress| {
-            let options = MinimiseOptions { keep_boundary_simple, ..Default::default() };
+            let options = MinimiseOptions { keep_apart, ..Default::default() };
             minimise_stretch(&mesh, &rest, start, &StretchSettings::default(), &options, progress)
         };
         let over: Vec<_> = mesh.positions().iter().map(|p| Point2::new(p.x, p.y)).collect();
