@@ -1,6 +1,8 @@
 # make test   everything: Rust, the wheel, Python without Blender, the add-on in every bpy that can be had
 # make demo   unwrap the demonstration meshes and compare with Smart UV Project: out/
-# Knobs: PYTHON (3.11 or later), CARGO, MESH=file for the demo, BLENDER=/path/to/blender for a real one instead of bpy.
+# make paper  the paper's figures and its comparison with Isomap, measured anew: out/paper/ and native/paper/
+# Knobs: PYTHON (3.11 or later), CARGO, MESH=file for the demo, BLENDER=/path/to/blender for a real one instead of bpy,
+# MODELS="a.obj b.obj" for the paper's figure 3 and its table.
 
 PYTHON ?= python3
 CARGO ?= cargo
@@ -10,7 +12,7 @@ WHEELS := addon/wheels
 # What the wheel is made of. Official Blender runs on glibc 2.28, which zig links against on any newer system.
 NATIVE := Cargo.toml Cargo.lock $(shell find native -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' 2>/dev/null)
 
-.PHONY: test test-rust test-python test-blender lint format venv wheel zip demo clean
+.PHONY: test test-rust test-python test-blender bench lint format venv wheel zip demo paper clean
 
 test: test-rust lint test-python test-blender
 
@@ -19,6 +21,10 @@ test-rust:
 	$(CARGO) clippy --workspace --all-targets --locked -- -D warnings
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --workspace --no-deps --locked --document-private-items
 	$(CARGO) test --locked
+
+# Figures and what they mean: native/ble_unwrap_core/benches/README.md. BENCH=embedding/face/1000 runs one.
+bench:
+	$(CARGO) bench --locked -p ble_unwrap_core --bench main -- $(BENCH)
 
 test-python: $(VENV)/.wheel
 	$(BIN)/python -m pytest tests --ignore=tests/blender
@@ -47,11 +53,19 @@ demo: zip
 	.ci/blender_libraries
 	$(PYTHON) .ci/demo $(MESH)
 
+paper: $(VENV)/.wheel $(VENV)/.paper
+	.ci/blender_libraries
+	$(BIN)/python .ci/paper $(MODELS)
+
 clean:
 	rm -rf target out .cache $(VENV) $(WHEELS)/*.whl $(WHEELS)/.built
 
 $(VENV)/.ready: .ci/requirements.txt
 	PYTHON="$(PYTHON)" .ci/make_venv $(VENV) -r .ci/requirements.txt
+	touch $@
+
+$(VENV)/.paper: .ci/paper_requirements.txt $(VENV)/.ready
+	$(BIN)/pip install --quiet --disable-pip-version-check -r .ci/paper_requirements.txt
 	touch $@
 
 $(WHEELS)/.built: $(NATIVE) $(VENV)/.ready

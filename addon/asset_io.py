@@ -1,4 +1,4 @@
-"""Mesh files into Blender and out again; nothing half-written is ever left in place of a file."""
+"""Files of meshes and points into Blender and out again; nothing half-written is ever left in place of a file."""
 
 import shutil
 import tempfile
@@ -6,11 +6,15 @@ from pathlib import Path
 
 import bpy
 
+from . import cloud_bridge, point_file, targets
+
 INPUT_FORMATS = ("blend", "obj", "glb", "gltf", "ply", "stl", "fbx")
 OUTPUT_FORMATS = ("blend", "glb", "obj", "fbx", "ply")
-# Formats that cannot be written, or hold no UVs, become another one.
 # Formats that keep a vertex once for each of its normals and UVs.
 SPLIT_FORMATS = ("glb", "gltf", "ply", "stl")
+# Formats that keep the UVs of points without faces; in PLY, of one cloud by itself.
+POINT_FORMATS = ("blend", "ply")
+# Formats that cannot be written, or hold no UVs, become another one.
 DEFAULT_OUTPUT = {"gltf": "glb", "stl": "glb"}
 
 
@@ -32,7 +36,7 @@ def new_scene():
 
 
 def load(path):
-    """Replaces the scene by a file's contents and returns its mesh objects, in order of name."""
+    """Replaces the scene by a file's contents and returns its meshes and point clouds, in order of name."""
     path = Path(path).absolute()  # Blender takes relative paths from $PWD, not from the working directory
     kind = file_format(path)
     if kind not in INPUT_FORMATS:
@@ -51,9 +55,12 @@ def load(path):
         raise AssetError("cannot be read: the importer gave up")
     if bpy.context.mode != "OBJECT" and bpy.ops.object.mode_set.poll():
         bpy.ops.object.mode_set(mode="OBJECT")
-    objects = [obj for obj in bpy.context.view_layer.objects if obj.type == "MESH"]
+    objects = [obj for obj in bpy.context.view_layer.objects if obj.type in targets.TYPES]
     if not objects:
         raise AssetError("holds no mesh")
+    if kind == "ply" and targets.is_cloud(objects[0]):
+        uv, normals = point_file.read_extras(path, len(objects[0].data.vertices))
+        cloud_bridge.add_point_data(objects[0].data, uv, normals)
     return sorted(objects, key=lambda obj: obj.name_full)
 
 
@@ -72,8 +79,16 @@ def _import(path, kind):
     return bpy.ops.import_scene.gltf(filepath=name)
 
 
-def save(path):
-    """Writes the scene as the format of the file's name: into a directory beside it first, then moved into place."""
+def keeps_points(kind, *, surfaces, clouds):
+    """Whether a file of a format can hold the UVs of the scene's clouds."""
+    return kind == "blend" or (kind == "ply" and not surfaces and clouds == 1)
+
+
+def save(path, *, cloud=None):
+    """Writes the scene as the format of the file's name: into a directory beside it first, then moved into place.
+
+    For PLY, `cloud` names the one object to write and the attribute that holds the UVs of its points.
+    """
     path = Path(path).absolute()
     kind = file_format(path)
     if kind not in OUTPUT_FORMATS:
@@ -84,7 +99,11 @@ def save(path):
     except OSError as error:
         raise AssetError(f"cannot write to {path.parent}: {error.strerror or error}") from error
     try:
-        if "FINISHED" not in _export(work / path.name, kind) or not (work / path.name).is_file():
+        if kind == "ply" and cloud is not None:
+            point_file.write_points(work / path.name, cloud_bridge.point_columns(*cloud))
+        elif "FINISHED" not in _export(work / path.name, kind):
+            raise AssetError(f"cannot write {path}: the exporter gave up")
+        if not (work / path.name).is_file():
             raise AssetError(f"cannot write {path}: the exporter gave up")
         companions = [name for name in work.iterdir() if name.name != path.name]
         for source in (*companions, work / path.name):  # the named file last: when it is there, all is there

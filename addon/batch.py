@@ -20,8 +20,9 @@ from pathlib import Path
 
 import bpy
 
-from . import asset_io, comparison, engine, mesh_bridge, properties
-from .task import unwrap_objects
+from . import asset_io, comparison, engine, mesh_bridge, properties, targets
+from .cloud_task import CloudTask
+from .run import run_objects
 
 OK, SOME_FAILED, USAGE, ENVIRONMENT, VIOLATED = range(5)
 REPORT_SCHEMA = 1
@@ -41,7 +42,9 @@ def add_setting_arguments(parser):
         option = "--" + name.replace("_", "-")
         text = keywords["description"].replace("%", "%%")
         default = keywords["default"]
-        shown = " ".join(map(str, default)) if isinstance(default, tuple) else str(default).lower()
+        shown = _shown(default)
+        if name in properties.PAPER_VALUES:
+            shown += f"; {_shown(properties.PAPER_VALUES[name])} with --preset paper"
         extra = {"dest": "setting_" + name, "default": None, "help": f"{text} (default: {shown})"}
         if isinstance(default, bool):
             group.add_argument(option, action=argparse.BooleanOptionalAction, **extra)
@@ -52,6 +55,11 @@ def add_setting_arguments(parser):
             group.add_argument(option, type=int, nargs="+", metavar="PIXELS", **extra)
         else:
             group.add_argument(option, type=_ranged(type(default), keywords), metavar=name.upper(), **extra)
+
+
+def _shown(value):
+    """A setting's value as it is given on the command line."""
+    return " ".join(map(str, value)) if isinstance(value, tuple) else str(value).lower()
 
 
 def _ranged(kind, keywords):
@@ -93,15 +101,23 @@ def settings_of(arguments, parser):
 def make_parser():
     parser = argparse.ArgumentParser(
         prog="ble_unwrap",
-        description="Unwrap mesh files: " + ", ".join("." + name for name in asset_io.INPUT_FORMATS) + ".",
-        epilog="Exit codes: 0 all fine, 1 some assets failed, 2 usage, 3 environment, 4 a certificate does not hold.",
+        description="Unwrap files of meshes, or of points without faces: "
+        + ", ".join("." + name for name in asset_io.INPUT_FORMATS)
+        + ".",
+        epilog="Meshes get a UV map, points an attribute of two floats; of the files .blend and .ply keep the latter. "
+        "Exit codes: 0 all fine, 1 some assets failed, 2 usage, 3 environment, 4 a certificate does not hold.",
     )
     parser.add_argument("inputs", nargs="+", metavar="IN", help="files to unwrap")
     parser.add_argument("-o", "--output", required=True, metavar="OUT", help="directory, or a file for a single input")
     parser.add_argument("--format", choices=asset_io.OUTPUT_FORMATS, help="output format (default: the input's)")
     parser.add_argument("--report", metavar="FILE", help="write a JSON report")
     parser.add_argument("--resume", action="store_true", help="skip what the report lists as done and is unchanged")
-    parser.add_argument("--atlas", choices=("asset", "object"), default="asset", help="one atlas per (default: asset)")
+    parser.add_argument(
+        "--atlas",
+        choices=("asset", "object"),
+        default="asset",
+        help="one atlas for all meshes of an asset, or one each; points always have one each (default: asset)",
+    )
     parser.add_argument("--compare", action="store_true", help="also measure Smart UV Project at the same margin")
     parser.add_argument("--threads", type=int, default=0, help="processor threads, 0 for all (default: 0)")
     parser.add_argument("--quiet", action="store_true", help="print errors only")
@@ -187,18 +203,14 @@ def process(source, target, settings, arguments):
     try:
         # These formats split vertices wherever normals or UVs differ.
         settings = {"weld": asset_io.file_format(source) in asset_io.SPLIT_FORMATS, **settings}
-        objects = asset_io.load(source)
-        with_faces = [obj for obj in mesh_bridge.unique_meshes(objects) if obj.data.polygons]
-        if not with_faces:
-            raise mesh_bridge.MeshError("holds no faces")
-        groups = [with_faces] if arguments.atlas == "asset" else [[obj] for obj in with_faces]
-        outcomes = [unwrap_objects(group, settings, threads=arguments.threads) for group in groups]
-        asset["objects"] = [describe(group, outcome) for group, outcome in zip(groups, outcomes, strict=True)]
-        asset["warnings"] = [text for outcome in outcomes for text in outcome.certificate.warnings]
+        objects, notes = unwrapped_objects(targets.unique_data(asset_io.load(source)), target)
+        run, outcomes = run_objects(objects, settings, threads=arguments.threads, one_atlas=arguments.atlas == "asset")
+        asset["objects"] = [describe(task, outcome) for task, outcome in zip(run.tasks, outcomes, strict=True)]
+        asset["warnings"] = notes + [text for outcome in outcomes for text in outcome.certificate.warnings]
         asset["summary"] = "; ".join(outcome.summary for outcome in outcomes)
         if arguments.compare:
-            add_baseline(asset, groups, settings)
-        asset_io.save(target)
+            add_baseline(asset, run, settings)
+        asset_io.save(target, cloud=written_cloud(run, outcomes))
         asset["out"] = str(target)
         broken = [text for outcome in outcomes for text in outcome.certificate.violations]
         asset["status"] = "violated" if broken else "ok"
@@ -212,12 +224,40 @@ def process(source, target, settings, arguments):
     return asset
 
 
-def describe(objects, outcome):
+def unwrapped_objects(objects, target):
+    """Objects whose maps the output can hold, and notes about those that are left out."""
+    surfaces, clouds = ([obj for obj in objects if test(obj)] for test in (targets.is_surface, targets.is_cloud))
+    if not surfaces and not clouds:
+        raise mesh_bridge.MeshError("holds no faces and no points to unwrap")
+    kind = asset_io.file_format(target)
+    if not clouds or asset_io.keeps_points(kind, surfaces=bool(surfaces), clouds=len(clouds)):
+        return surfaces + clouds, []
+    if not surfaces:
+        if kind == "ply":
+            raise mesh_bridge.MeshError("holds several clouds, and a .ply file keeps one: use --format blend")
+        able = " or ".join(asset_io.POINT_FORMATS)
+        raise mesh_bridge.MeshError(f"holds points, whose UVs .{kind} files cannot keep: use --format {able}")
+    return surfaces, [f"{obj.name}: left out, .{kind} files cannot keep UVs of its points" for obj in clouds]
+
+
+def written_cloud(run, outcomes):
+    """The only cloud of a run and its attribute, for `asset_io.save`; None for anything else."""
+    if len(run.tasks) != 1 or not isinstance(run.tasks[0], CloudTask):
+        return None
+    return bpy.data.objects[run.tasks[0].title], outcomes[0].maps[0]
+
+
+def describe(task, outcome):
     """The report's entry for one atlas."""
+    if isinstance(task, CloudTask):
+        names, size = [task.title], {"kind": "cloud", "points": task.element_count}
+    else:
+        names = [part.object_name for part in task.selection.parts]
+        size = {"kind": "surface", "corners": len(task.selection.corner_vertices)}
     return {
-        "names": [obj.name for obj in objects],
-        "uv_maps": [obj.data.uv_layers.active.name for obj in objects],
-        "corners": sum(len(obj.data.loops) for obj in objects),
+        "names": names,
+        "uv_maps": outcome.maps,
+        **size,
         "time_s": round(outcome.seconds, 4),
         "certificate": {"holds": outcome.certificate.holds, "violations": outcome.certificate.violations},
         "measured": outcome.certificate.measured,
@@ -228,10 +268,13 @@ def describe(objects, outcome):
     }
 
 
-def add_baseline(asset, groups, settings):
-    """Measures Smart UV Project in a UV map of its own, and takes that map away again."""
+def add_baseline(asset, run, settings):
+    """Measures Smart UV Project in a UV map of its own, and takes that map away again. It cannot map clouds."""
     full = {**properties.default_values(settings["preset"]), **settings}
-    for entry, group in zip(asset["objects"], groups, strict=True):
+    for entry, task in zip(asset["objects"], run.tasks, strict=True):
+        if isinstance(task, CloudTask):
+            continue
+        group = task.objects
         active = [obj.data.uv_layers.active.name for obj in group]
         results, best = comparison.best_smart_uv(group, margin=full["margin"], texture_size=full["texture_size"])
         entry["baseline_smart_uv"] = {"best_angle": best, "by_angle": results}

@@ -28,10 +28,10 @@ class EngineCancelled(Exception):
 
 @dataclass
 class Result:
-    """An unwrapped mesh: one UV per corner, a chart per face, and the native report."""
+    """One UV per corner and a chart per face of a mesh, or one of both per point of a cloud; and the native report."""
 
     uv: np.ndarray  # (c, 2) float32
-    chart: np.ndarray  # (f,) int32
+    chart: np.ndarray  # (f,) int32; of a point that is in no chart: -1
     report: dict
 
 
@@ -122,12 +122,27 @@ def unwrap(selection, settings, *, use_seams=False):
     return _result(_translated(lambda module: module.unwrap(*positional, **keywords)))
 
 
-class Job:
-    """An unwrap on the native module's own thread."""
+def unwrap_points(positions, settings):
+    """Maps a cloud at once. Raises `EngineMissing`, `EngineError`."""
+    return _result(_translated(lambda module: module.unwrap_points(positions, **native_settings(settings))))
 
-    def __init__(self, selection, settings, *, use_seams=False):
-        positional, keywords = _arguments(selection, settings, use_seams)
-        self._job = _translated(lambda module: module.submit_unwrap(*positional, **keywords))
+
+def submit_unwrap(selection, settings, *, use_seams=False):
+    """Unwraps on another thread: a `Job`. Raises `EngineMissing`, `EngineError`."""
+    positional, keywords = _arguments(selection, settings, use_seams)
+    return Job(_translated(lambda module: module.submit_unwrap(*positional, **keywords)))
+
+
+def submit_unwrap_points(positions, settings):
+    """Maps a cloud on another thread: a `Job`. Raises `EngineMissing`, `EngineError`."""
+    return Job(_translated(lambda module: module.submit_unwrap_points(positions, **native_settings(settings))))
+
+
+class Job:
+    """A computation on the native module's own thread."""
+
+    def __init__(self, native_job):
+        self._job = native_job
 
     def progress(self):
         """Share of the work done, 0 to 1."""
@@ -206,7 +221,7 @@ def summary(measured, seconds=None):
     charts, overlaps, flips = (int(measured.get(key) or 0) for key in ("charts", "overlaps", "flips"))
     parts = [
         f"{charts} chart{'' if charts == 1 else 's'}",
-        f"stretch {_number(measured.get('l2'))} (worst chart {_number(measured.get('l2_worst_chart'))})",
+        f"stretch {number_text(measured.get('l2'))} (worst chart {number_text(measured.get('l2_worst_chart'))})",
         f"{overlaps} overlap{'' if overlaps == 1 else 's'}",
         f"{flips} flip{'' if flips == 1 else 's'}",
         f"{100 * float(measured.get('packing_efficiency') or 0):.0f}% used",
@@ -226,7 +241,7 @@ def lines(certificate, *, margin, stretch_limit):
     overlaps, flips, unmapped = (int(measured.get(key) or 0) for key in ("overlaps", "flips", "unmapped_faces"))
     result = [
         ("INFO", f"{int(measured.get('faces') or 0):,} faces in {charts:,} charts"),
-        ("OK" if stretch_ok else "BAD", f"Stretch {_number(measured.get('l2'))}, worst chart {_number(worst)}"),
+        ("OK" if stretch_ok else "BAD", f"Stretch {number_text(measured.get('l2'))}, worst chart {number_text(worst)}"),
         ("BAD" if overlaps else "OK", f"{overlaps} overlaps"),
         ("BAD" if flips else "OK", f"{flips} flipped faces"),
     ]
@@ -241,5 +256,6 @@ def lines(certificate, *, margin, stretch_limit):
     return result + [("WARN", text) for text in certificate.warnings]
 
 
-def _number(value):
+def number_text(value):
+    """A measurement with three digits, or a question mark."""
     return f"{float(value):.3f}" if value is not None and np.isfinite(value) else "?"

@@ -4,8 +4,11 @@ import bpy
 
 
 def menu_names():
-    """Menus that get an entry. From 4.3 on the 3D view's UV menu shows the UV editor's Unwrap menu: once is enough."""
-    names = ["IMAGE_MT_uvs_unwrap", "VIEW3D_MT_object"]
+    """Menus that get an entry. From 4.3 on the 3D view's UV menu shows the UV editor's Unwrap menu: once is enough.
+
+    Point clouds have no UV menu: theirs are the Object menu and that of their edit mode.
+    """
+    names = ["IMAGE_MT_uvs_unwrap", "VIEW3D_MT_object", "VIEW3D_MT_edit_pointcloud"]
     if bpy.app.version < (4, 3, 0):
         names.append("VIEW3D_MT_uv_map")
     return names

@@ -1,4 +1,5 @@
-"""Blender's meshes to flat arrays, and UVs back: the only file that touches mesh data.
+"""Blender's meshes to flat arrays, and UVs back: the only file that touches mesh data; cloud_bridge.py builds upon it
+for points without faces.
 
 Everything crosses in bulk (`foreach_get`, `foreach_set`); no loop runs over elements. Reading changes nothing.
 Writing happens in one go at the end, and only on meshes that are still as they were read.
@@ -17,6 +18,10 @@ SCALE_TOLERANCE = 1e-3  # relative difference of an object's axes from which its
 
 class MeshError(Exception):
     """The selection cannot be unwrapped, or not any more; the text is for the user."""
+
+
+class NothingToUnwrap(MeshError):
+    """There is no face, or none is selected."""
 
 
 @dataclass
@@ -53,17 +58,6 @@ class Selection:
     @property
     def face_count(self):
         return len(self.face_offsets) - 1
-
-
-def target_objects(context):
-    """Mesh objects to unwrap, one per mesh: those in edit mode, else the selected ones, the active one first."""
-    if context.mode == "EDIT_MESH":
-        objects = list(context.objects_in_mode_unique_data)
-    else:
-        objects = list(context.selected_objects)
-    active = context.view_layer.objects.active
-    objects.sort(key=lambda obj: (obj != active, obj.name_full))
-    return unique_meshes(objects)
 
 
 def unique_meshes(objects):
@@ -122,7 +116,7 @@ def gather(objects, *, only_selected=False, make_new_map=False):
         face_base += face_count
     if not parts:
         chosen = only_selected and any(obj.mode == "EDIT" and obj.data.polygons for obj in objects)
-        raise MeshError("No faces are selected" if chosen else "There are no faces to unwrap")
+        raise NothingToUnwrap("No faces are selected" if chosen else "There are no faces to unwrap")
     if max(vertex_base, corner_base) > np.iinfo(np.int32).max:
         raise MeshError("The selection is too large: more than two thousand million corners")
     positions, corner_vertices, sizes, triangles, seams = (
@@ -298,15 +292,26 @@ def object_mode(meshes):
         view_layer.objects.active = active
 
 
+def check_parts(selection, make_new_map=False):
+    """The meshes of all parts, or `MeshError` where one is gone, edited or full."""
+    meshes = [find_mesh(part) for part in selection.parts]
+    if make_new_map and any(len(mesh.uv_layers) >= MAX_UV_MAPS for mesh in meshes):
+        raise MeshError(f"A mesh has {MAX_UV_MAPS} UV maps already; nothing was changed")
+    return meshes
+
+
+def active_maps(selection):
+    """Names of the active UV maps of all parts."""
+    return [find_mesh(part).uv_layers.active.name for part in selection.parts]
+
+
 def write_uvs(selection, uv, *, make_new_map=False, map_name="UVMap", mark_seams=False):
     """Writes one UV per corner to all parts, and returns what the meshes hold afterwards, (c, 2) float32.
 
     Nothing is changed when any mesh is gone, edited or full. Only the corners of the selection are written.
     """
     uv = np.ascontiguousarray(uv, np.float32)
-    meshes = [find_mesh(part) for part in selection.parts]
-    if make_new_map and any(len(mesh.uv_layers) >= MAX_UV_MAPS for mesh in meshes):
-        raise MeshError(f"A mesh has {MAX_UV_MAPS} UV maps already; nothing was changed")
+    meshes = check_parts(selection, make_new_map)
     held = np.empty_like(uv)
     with object_mode(meshes):
         for part, mesh in zip(selection.parts, meshes, strict=True):

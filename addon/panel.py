@@ -4,10 +4,10 @@ import json
 
 import bpy
 
-from . import properties
+from . import properties, targets
 
 CATEGORY = "BLE Unwrap"
-STATUS_ICONS = {"OK": "CHECKMARK", "BAD": "ERROR", "WARN": "INFO", "INFO": "BLANK1"}
+STATUS_ICONS = {"HEAD": "DOT", "OK": "CHECKMARK", "BAD": "ERROR", "WARN": "INFO", "INFO": "BLANK1"}
 WARNING_CHARACTERS = 34  # of a line of the panel at its usual width
 
 
@@ -16,12 +16,23 @@ def draw_settings(layout, context, names):
     layout.use_property_split = True
     layout.use_property_decorate = False
     column = layout.column()
-    for name in names:
-        if name == "uv_map_name" and settings.uv_map != "NEW":
-            continue
-        if name == "use_selection" and context.mode != "EDIT_MESH":
-            continue
+    for name in panel_settings(settings, context, names):
         column.prop(settings, name)
+
+
+def panel_settings(settings, context, names):
+    """Those of the settings that matter to what is selected and to the other settings."""
+    surfaces, clouds = targets.shown_kinds(context)
+    left_out = set()
+    if context.mode not in targets.EDIT_MODES:
+        left_out.add("use_selection")
+    if settings.uv_map != "NEW" and not clouds:
+        left_out.add("uv_map_name")  # a cloud has no active map: its attribute goes by name
+    if not surfaces:
+        left_out.update(properties.SURFACE_SETTINGS)
+    if not clouds:
+        left_out.update(properties.CLOUD_SETTINGS)
+    return [name for name in names if name not in left_out]
 
 
 class _Main:
@@ -50,7 +61,7 @@ class _Certificate:
     def draw(self, context):
         certificate = context.window_manager.ble_unwrap_certificate
         column = self.layout.column(align=True)
-        column.label(text=certificate.title, icon="MESH_DATA")
+        column.label(text=certificate.title, icon="UV")
         for status, text in json.loads(certificate.lines):
             icon = STATUS_ICONS.get(status, "BLANK1")
             for line in wrapped(text) if status == "WARN" else [text]:
@@ -66,6 +77,8 @@ class _Advanced:
 
     def draw(self, context):
         for title, names in properties.ADVANCED_SETTINGS:
+            if not panel_settings(context.scene.ble_unwrap, context, names):
+                continue
             header, body = self.layout.panel(f"BLE_UNWRAP_{title}", default_closed=title != "Result")
             header.label(text=title)
             if body:

@@ -18,6 +18,7 @@ PAPER_VALUES = {
     "geodesics": "FAST_MARCHING",
     "landmark_min": 3,
     "landmark_max": 0,
+    "together_max": 2000,
     "holes": "CUT",
     "coarse": False,
     "stretch_solver": "LINE_SEARCH",
@@ -26,6 +27,8 @@ PAPER_VALUES = {
     "texture_size": (1024, 1024),
     "rotation": "QUARTER",
 }
+# Preset -> what it differs in from the defaults.
+PRESET_VALUES = {"PAPER": PAPER_VALUES, "ISO_CHARTS": PAPER_VALUES | {"model": "ISOMAP"}}
 
 
 def _apply_preset(settings, _context):
@@ -33,9 +36,8 @@ def _apply_preset(settings, _context):
     for name in annotations():
         if name not in BRIDGE_SETTINGS and name != "preset":
             settings.property_unset(name)
-    if settings.preset == "PAPER":
-        for name, value in PAPER_VALUES.items():
-            setattr(settings, name, value)
+    for name, value in PRESET_VALUES.get(settings.preset, {}).items():
+        setattr(settings, name, value)
 
 
 class BLEUnwrapSettings(bpy.types.PropertyGroup):
@@ -47,6 +49,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         items=(
             ("DEFAULT", "Default", "Extended model, fast solvers: least stretch and fewest charts"),
             ("PAPER", "Paper", "The published method as printed: slower, more charts"),
+            ("ISO_CHARTS", "Iso-charts", "The same with Isomap, the method the paper compares itself with"),
         ),
         default="DEFAULT",
         update=_apply_preset,
@@ -103,24 +106,24 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         default=False,
     )
     use_selection: BoolProperty(
-        name="Only Selected Faces",
-        description="In Edit Mode, unwrap the selected faces and leave the others as they are",
+        name="Only Selected",
+        description="In Edit Mode, unwrap the selected faces, or points of a cloud, and leave the others as they are",
         default=True,
     )
 
     # ---- where the result goes
     uv_map: EnumProperty(
         name="UV Map",
-        description="Which UV map is written",
+        description="Which UV map is written; of a point cloud, which attribute of two numbers a point",
         items=(
-            ("ACTIVE", "Active", "Replace the active UV map; one is made where there is none"),
+            ("ACTIVE", "Active", "Replace the active UV map, of points the one of this name; made where there is none"),
             ("NEW", "New", "Add a UV map and make it the active one"),
         ),
         default="ACTIVE",
     )
     uv_map_name: StringProperty(
         name="Name",
-        description="Name of UV maps that are made",
+        description="Name of UV maps that are made and of a cloud's attribute; if other data has it, the next free one",
         default="UVMap",
         maxlen=60,
     )
@@ -142,7 +145,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         default=False,
     )
     coarse: BoolProperty(
-        name="Coarse Mesh",
+        name="Coarse First",
         description="Decide on a coarse copy where to cut large pieces of surface, which is many times faster",
         default=True,
     )
@@ -174,6 +177,15 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         description="Start of all random choices; the same seed gives the same result on any machine",
         default=0,
         min=0,
+    )
+
+    neighbours: IntProperty(
+        name="Neighbours",
+        description="Nearest points that each point of a cloud is joined to; more bridge gaps, fewer keep sheets apart",
+        default=12,
+        min=4,
+        max=256,
+        soft_max=64,
     )
 
     # ---- landmarks and distances
@@ -210,6 +222,17 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         default=64,
         min=0,
         max=100_000,
+        soft_max=2000,
+    )
+    together_max: IntProperty(
+        name="Together",
+        description=(
+            "Charts of at most so many vertices are embedded with all their vertices together, as in the paper, at a "
+            "cost of the square of their number; larger ones by their landmarks"
+        ),
+        default=0,
+        min=0,
+        max=20_000,
         soft_max=2000,
     )
 
@@ -304,13 +327,19 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
 
 # Settings that the native module never sees.
 BRIDGE_SETTINGS = ("use_seams", "use_selection", "uv_map", "uv_map_name", "use_original_bounds", "mark_seams")
+# What means something for surfaces only, or for clouds only; the other one's functions do not take it.
+SURFACE_SETTINGS = (
+    *("use_seams", "mark_seams", "weld", "merge", "holes", "chart_scale", "geodesics"),
+    *("together_max", "stretch_solver", "stretch_iterations"),
+)
+CLOUD_SETTINGS = ("neighbours",)
 
 # What the panel shows at once, and what it folds away, by title.
 MAIN_SETTINGS = ("stretch_limit", "texture_size", "margin", "rotation", "use_seams", "use_selection")
 ADVANCED_SETTINGS = (
     ("Result", ("uv_map", "uv_map_name", "use_original_bounds", "mark_seams")),
-    ("Charts", ("weld", "coarse", "merge", "holes", "chart_scale", "seed")),
-    ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max")),
+    ("Charts", ("neighbours", "weld", "coarse", "merge", "holes", "chart_scale", "seed")),
+    ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max", "together_max")),
     ("Embedding", ("model", "kernel_width", "relaxation", "max_sweeps", "tolerance", "update", "initial")),
     ("Stretch", ("stretch_solver", "stretch_iterations")),
 )
@@ -319,6 +348,11 @@ ADVANCED_SETTINGS = (
 def annotations():
     """The declared settings: name -> deferred property, in order of declaration."""
     return BLEUnwrapSettings.__annotations__
+
+
+def native_values(settings, left_out):
+    """Settings for a native function: those of the bridge and those that it does not take left out."""
+    return {name: value for name, value in settings.items() if name not in BRIDGE_SETTINGS and name not in left_out}
 
 
 def operator_annotations():
@@ -360,8 +394,8 @@ def values(settings):
 def default_values(preset="DEFAULT"):
     """The declared default of every setting under a preset, as plain values."""
     result = {name: deferred.keywords.get("default") for name, deferred in annotations().items()}
-    if preset == "PAPER":
-        result.update(PAPER_VALUES, preset="PAPER")
+    if preset in PRESET_VALUES:
+        result.update(PRESET_VALUES[preset], preset=preset)
     return result
 
 

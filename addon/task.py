@@ -1,4 +1,4 @@
-"""One unwrap from objects to certificate: what the operator and the command line share."""
+"""One unwrap of surfaces, from objects to certificate: what the operator and the command line share."""
 
 import time
 from dataclasses import dataclass
@@ -21,6 +21,23 @@ class Outcome:
     seconds: float
     summary: str
     lines: list
+    maps: list  # name of the UV map or point attribute of every object
+
+
+class Timer:
+    """Seconds of a task: computing and writing, without waiting for other tasks in between."""
+
+    def __init__(self):
+        self._started, self._before = None, 0.0
+
+    def start(self):
+        self._started = time.perf_counter()
+
+    def pause(self):
+        self._before, self._started = self.seconds(), None
+
+    def seconds(self):
+        return self._before + (time.perf_counter() - self._started if self._started is not None else 0.0)
 
 
 class UnwrapTask:
@@ -30,17 +47,18 @@ class UnwrapTask:
     """
 
     def __init__(self, objects, settings, *, threads=0):
+        self.objects = list(objects)
         self.settings = {**properties.default_values(settings.get("preset", "DEFAULT")), **settings}
         self.make_new_map = self.settings["uv_map"] == "NEW"
         self.selection = mesh_bridge.gather(
             objects, only_selected=self.settings["use_selection"], make_new_map=self.make_new_map
         )
-        self.native = {name: value for name, value in settings.items() if name not in properties.BRIDGE_SETTINGS}
+        self.native = properties.native_values(settings, properties.CLOUD_SETTINGS)
         self.native["threads"] = threads
         self.bounds = None
         if self.settings["use_original_bounds"]:
             self._keep_place()
-        self.started = time.perf_counter()
+        self.timer = Timer()
 
     def _keep_place(self):
         """Packs for the part of the texture that the old UVs fill, so that margin and density come out right."""
@@ -48,14 +66,19 @@ class UnwrapTask:
         if held is None or not np.isfinite(held).all():
             self.selection.warnings.append("There were no UVs whose place could be kept")
             return
-        low, high = held.min(axis=0).astype(float), held.max(axis=0).astype(float)
-        width, height = self.settings["texture_size"]
-        if (high - low).min() < SMALLEST_BOUNDS:
+        self.bounds = bounds_of(held, self.settings["texture_size"])
+        if self.bounds is None:
             self.selection.warnings.append("The old UVs fill no rectangle; the whole square was used")
             return
-        pixels = np.maximum(1, np.floor((high - low) * (width, height))).astype(int)
-        self.bounds = (low, pixels / (width, height))
-        self.native["texture_size"] = (int(pixels[0]), int(pixels[1]))
+        self.native["texture_size"] = self.bounds.pixels
+
+    @property
+    def title(self):
+        return self.selection.title
+
+    @property
+    def element_count(self):
+        return self.selection.face_count
 
     @property
     def use_seams(self):
@@ -63,20 +86,22 @@ class UnwrapTask:
 
     def run(self):
         """Computes the result at once."""
+        self.timer.start()
         return engine.unwrap(self.selection, self.native, use_seams=self.use_seams)
 
     def start(self):
         """Computes the result on another thread: an `engine.Job`."""
-        return engine.Job(self.selection, self.native, use_seams=self.use_seams)
+        self.timer.start()
+        return engine.submit_unwrap(self.selection, self.native, use_seams=self.use_seams)
+
+    def check(self):
+        """Raises `mesh_bridge.MeshError` where `write` would: several tasks are written together or not at all."""
+        mesh_bridge.check_parts(self.selection, self.make_new_map)
 
     def write(self, result, *, measure_again=True):
         """Writes a result to the meshes and judges what they hold afterwards."""
-        if not np.isfinite(result.uv).all():
-            raise engine.EngineError("the native library returned UVs that are not finite; nothing was changed")
-        uv = result.uv
-        if self.bounds is not None:
-            low, extent = self.bounds
-            uv = (low + uv.astype(np.float64) * extent).astype(np.float32)
+        self.timer.start()
+        uv = placed(result.uv, self.bounds)
         held = mesh_bridge.write_uvs(
             self.selection,
             uv,
@@ -94,7 +119,7 @@ class UnwrapTask:
             except engine.EngineError as error:  # the UVs are written: say what is known
                 warnings.append(f"The written UVs could not be measured: {error}")
         certificate = engine.certify(measured, margin=margin, stretch_limit=limit, warnings=warnings)
-        seconds = time.perf_counter() - self.started
+        seconds = self.timer.seconds()
         return Outcome(
             title=self.selection.title,
             certificate=certificate,
@@ -102,7 +127,48 @@ class UnwrapTask:
             seconds=seconds,
             summary=engine.summary(measured, seconds),
             lines=engine.lines(certificate, margin=margin, stretch_limit=limit),
+            maps=mesh_bridge.active_maps(self.selection),
         )
+
+
+@dataclass
+class Bounds:
+    """The part of the texture to pack into: its lower corner and extent in UVs, and its size in whole pixels."""
+
+    low: np.ndarray  # (2,)
+    extent: np.ndarray  # (2,)
+    pixels: tuple
+
+
+def bounds_of(uv, texture_size):
+    """The rectangle that UVs fill, in whole pixels; None where it is too small to pack into."""
+    low, high = uv.min(axis=0).astype(float), uv.max(axis=0).astype(float)
+    if (high - low).min() < SMALLEST_BOUNDS:
+        return None
+    pixels = np.maximum(1, np.floor((high - low) * texture_size)).astype(int)
+    return Bounds(low, pixels / texture_size, (int(pixels[0]), int(pixels[1])))
+
+
+def placed(uv, bounds):
+    """UVs of the unit square, moved into the bounds if there are any. Raises `engine.EngineError` where not finite."""
+    if not np.isfinite(uv).all():
+        raise engine.EngineError("the native library returned UVs that are not finite; nothing was changed")
+    if bounds is None:
+        return uv
+    return (bounds.low + uv.astype(np.float64) * bounds.extent).astype(np.float32)
+
+
+def finished(job, progress=None):
+    """Waits for a job and returns its result; `progress(fraction, stage)` is called meanwhile."""
+    try:
+        while not job.is_finished():
+            if progress:
+                progress(job.progress(), job.stage())
+            time.sleep(POLL_SECONDS)
+    except KeyboardInterrupt:
+        job.cancel()
+        raise
+    return job.result()
 
 
 def unwrap_objects(objects, settings, *, threads=0, progress=None):
@@ -112,13 +178,6 @@ def unwrap_objects(objects, settings, *, threads=0, progress=None):
     """
     settings = {"preset": "DEFAULT", "use_selection": False, **settings}
     task = UnwrapTask(mesh_bridge.unique_meshes(objects), settings, threads=threads)
-    job = task.start()
-    try:
-        while not job.is_finished():
-            if progress:
-                progress(job.progress(), job.stage())
-            time.sleep(POLL_SECONDS)
-    except KeyboardInterrupt:
-        job.cancel()
-        raise
-    return task.write(job.result())
+    result = finished(task.start(), progress)
+    task.timer.pause()
+    return task.write(result)

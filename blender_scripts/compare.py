@@ -38,6 +38,7 @@ def compare_objects(objects, name, out, settings, *, threads=0, picture_size=900
 def main(argv):
     batch, asset_io = addon_loader.load("batch"), addon_loader.load("asset_io")
     engine, bridge = addon_loader.load("engine"), addon_loader.load("mesh_bridge")
+    targets = addon_loader.load("targets")
     parser = argparse.ArgumentParser(prog="compare.py", description="BLE Unwrap against Smart UV Project.")
     parser.add_argument("inputs", nargs="+", metavar="IN")
     parser.add_argument("-o", "--output", required=True, metavar="OUTDIR")
@@ -65,7 +66,7 @@ def main(argv):
         source = Path(name)
         key = source.stem if source.stem not in models else f"{source.stem}_{number}"
         try:
-            objects = [obj for obj in asset_io.load(source) if obj.data.polygons]
+            objects = [obj for obj in asset_io.load(source) if targets.is_surface(obj)]
             if not objects:
                 raise bridge.MeshError("holds no faces")
             models[key] = compare_objects(

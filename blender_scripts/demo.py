@@ -19,7 +19,9 @@ ENVIRONMENT = 3
 
 def main():
     parser = argparse.ArgumentParser(prog="demo.py", description="Unwrap demonstration meshes, or one of your own.")
-    parser.add_argument("mesh", nargs="?", help="your own file instead: .blend .obj .glb .gltf .ply .stl .fbx")
+    parser.add_argument(
+        "mesh", nargs="?", help="your own file instead, of meshes or points: .blend .obj .glb .gltf .ply .stl .fbx"
+    )
     parser.add_argument("-o", "--output", default=launch.REPO / "out", help="directory of the results (default: out)")
     parser.add_argument("--zip", help="the extension (default: the one that `make zip` built)")
     parser.add_argument("--render", action=argparse.BooleanOptionalAction, default=True, help="also render pictures")

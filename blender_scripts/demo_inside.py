@@ -2,6 +2,7 @@
 
 Writes OUT/report.json and, for every mesh, NAME.blend (both layouts as UV maps), NAME_layout.png (both layouts
 coloured by stretch) and NAME_render.png (the model under a numbered grid, BLE Unwrap left, Smart UV Project right).
+A point cloud, which Smart UV Project cannot map, gets NAME_render.png alone: under a checker, beside its atlas.
 """
 
 import argparse
@@ -13,13 +14,18 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import addon_loader
 import compare
+import demo_clouds
 import demo_meshes
 import pictures
 import render
+import render_points
 import tables
 
 RENDER_SIZE = (640, 480)
 RENDER_SAMPLES = 12
+CLOUD_SIZE = (560, 312)
+CLOUD_CELLS = 16
+CLOUD_SAMPLES = 32
 
 
 def show_progress(fraction, stage):
@@ -30,29 +36,77 @@ def show_progress(fraction, stage):
 
 def render_both(objects, out, name):
     """Renders both UV maps side by side."""
-    import bpy
-    import numpy as np
-
     comparison = addon_loader.load("comparison")
     halves = []
     for number, map_name in enumerate((comparison.BLE_MAP, comparison.SMART_MAP)):
         part = out / f".{name}_{number}.png"
         render.render_objects(objects, part, map_name, size=RENDER_SIZE, samples=RENDER_SAMPLES)
-        image = bpy.data.images.load(str(part))
-        image.colorspace_settings.name = "Non-Color"  # the values as they are in the file
-        pixels = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
-        image.pixels.foreach_get(pixels)
-        pixels = pixels.reshape(image.size[1], image.size[0], image.channels)[::-1, :, :3]
-        halves.append(pictures.with_captions((pixels * 255 + 0.5).astype(np.uint8), [map_name]))
-        bpy.data.images.remove(image)
-        part.unlink()
+        halves.append(pictures.with_captions(taken(part), [map_name]))
     pictures.write_png(out / f"{name}_render.png", pictures.side_by_side(halves))
+
+
+def taken(path):
+    """The pixels of a picture file as (h, w, 3) uint8; the file is removed."""
+    import bpy
+    import numpy as np
+
+    image = bpy.data.images.load(str(path))
+    image.colorspace_settings.name = "Non-Color"  # the values as they are in the file
+    pixels = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(image.size[1], image.size[0], image.channels)[::-1, :, :3]
+    bpy.data.images.remove(image)
+    path.unlink()
+    return (pixels * 255 + 0.5).astype(np.uint8)
+
+
+def demonstrate_mesh(objects, name, out, options):
+    """Unwraps by both methods and draws both; the comparison's rows."""
+    engine = addon_loader.load("engine")
+    faces = sum(len(obj.data.polygons) for obj in objects)
+    print(f"{name}: {faces:,} faces; unwrapping by BLE Unwrap and Smart UV Project", flush=True)
+    rows = compare.compare_objects(objects, name, out, {}, progress=show_progress)
+    end_progress()
+    print(f"{name}: {engine.summary(rows['ble_unwrap'], rows['ble_unwrap']['seconds_total'])}", flush=True)
+    if options.render:
+        print(f"{name}: rendering", flush=True)
+        render_both(objects, out, name)
+    return rows
+
+
+def demonstrate_cloud(cloud, name, out, options):
+    """Maps a cloud and draws it under a checker, beside its atlas; the report's entry."""
+    print(f"{name}: {len(render_points.world_points(cloud)):,} points; mapping by BLE Unwrap", flush=True)
+    _, (outcome,) = addon_loader.load("run").run_objects([cloud], {}, progress=show_progress)
+    end_progress()
+    print(f"{name}: {outcome.summary}", flush=True)
+    if options.render:
+        print(f"{name}: rendering", flush=True)
+        (map_name,) = outcome.maps
+        part = out / f".{name}.png"
+        render.render_objects([cloud], part, map_name, size=CLOUD_SIZE, samples=CLOUD_SAMPLES, cells=CLOUD_CELLS)
+        uv = render_points.map_of(cloud, map_name)
+        atlas = pictures.point_layout(uv, render_points.checker_colours(uv, CLOUD_CELLS), CLOUD_SIZE[1])
+        found = outcome.certificate.measured
+        captions = [f"{found['points']:,} points, no faces"], [f"{found['charts']} charts, stretch {found['l2']:.3f}"]
+        halves = [pictures.with_captions(half, text) for half, text in zip((taken(part), atlas), captions, strict=True)]
+        pictures.write_png(out / f"{name}_render.png", pictures.side_by_side(halves))
+    return {
+        **outcome.certificate.measured,
+        "seconds_total": outcome.seconds,
+        "violations": outcome.certificate.violations,
+    }
+
+
+def end_progress():
+    if sys.stdout.isatty():
+        print("\r" + 40 * " ", end="\r")
 
 
 def main(argv):
     import bpy
 
-    batch, asset_io, engine = (addon_loader.load(name) for name in ("batch", "asset_io", "engine"))
+    batch, asset_io, engine, targets = (addon_loader.load(name) for name in ("batch", "asset_io", "engine", "targets"))
     parser = argparse.ArgumentParser(prog="demo_inside.py")
     parser.add_argument("-o", "--output", required=True)
     parser.add_argument("--mesh")
@@ -65,11 +119,12 @@ def main(argv):
         "suzanne": demo_meshes.suzanne,
         "spiral_ramp": demo_meshes.spiral_ramp,
         "sculpt": demo_meshes.sculpt,
+        "cloud": demo_clouds.add_scan,
     }
     if options.mesh:
         path = Path(options.mesh)
         makers = {path.stem: lambda: None}
-    models, failed = {}, []
+    models, clouds, failed = {}, {}, []
     for number, (name, make) in enumerate(makers.items(), 1):
         started = time.perf_counter()
         try:
@@ -78,22 +133,17 @@ def main(argv):
             else:
                 asset_io.new_scene()
                 objects = [make()]
-            objects = [obj for obj in objects if obj.data.polygons]
-            faces = sum(len(obj.data.polygons) for obj in objects)
-            if not faces:
-                raise asset_io.AssetError("holds no faces")
-            head = f"[{number}/{len(makers)}] {name}"
-            print(f"{head}: {faces:,} faces; unwrapping by BLE Unwrap and Smart UV Project", flush=True)
-            rows = compare.compare_objects(objects, name, out, {}, progress=show_progress)
-            if sys.stdout.isatty():
-                print("\r" + 40 * " ", end="\r")
-            models[name] = rows
-            print(f"{head}: {engine.summary(rows['ble_unwrap'], rows['ble_unwrap']['seconds_total'])}", flush=True)
+            surfaces = [obj for obj in objects if targets.is_surface(obj)]
+            points = [obj for obj in objects if targets.is_cloud(obj)]
+            if not surfaces and not points:
+                raise asset_io.AssetError("holds no faces and no points")
+            print(f"[{number}/{len(makers)}] ", end="")
+            if surfaces:
+                models[name] = demonstrate_mesh(surfaces, name, out, options)
+            else:
+                clouds[name] = demonstrate_cloud(points[0], name, out, options)
             asset_io.save(out / f"{name}.blend")
-            if options.render:
-                print(f"{head}: rendering", flush=True)
-                render_both(objects, out, name)
-            print(f"{head}: done in {time.perf_counter() - started:.1f} s", flush=True)
+            print(f"{name}: done in {time.perf_counter() - started:.1f} s", flush=True)
         except (*batch.USER_ERRORS, RuntimeError, OSError) as error:
             failed.append({"model": name, "error": str(error)})
             print(f"{name}: {error}", file=sys.stderr, flush=True)
@@ -110,16 +160,18 @@ def main(argv):
         "blender": bpy.app.version_string,
         "native": engine.version(),
         "models": models,
+        "clouds": clouds,
         "failed": failed,
     }
     batch.write_json(out / "report.json", report)
-    for name in models:
-        kinds = ("blend", "layout.png", "render.png") if options.render else ("blend", "layout.png")
-        print("  " + "  ".join(f"{out / name}{'.' if kind == 'blend' else '_'}{kind}" for kind in kinds))
+    for name in [*models, *clouds]:
+        files = [f"{name}.blend"] + [f"{name}_layout.png"] * (name in models) + [f"{name}_render.png"] * options.render
+        print("  " + "  ".join(str(out / file) for file in files))
     print(f"  {out / 'report.json'}")
     if failed:
         return batch.SOME_FAILED
     broken = {name: rows["ble_unwrap"]["violations"] for name, rows in models.items()}
+    broken |= {name: found["violations"] for name, found in clouds.items()}
     for name, violations in broken.items():
         for text in violations:
             print(f"{name}: certificate does not hold: {text}", file=sys.stderr)

@@ -41,14 +41,18 @@ def write_png(path, pixels):
     """Writes (h, w, 3) uint8 as a PNG file, under a temporary name first."""
     pixels = np.ascontiguousarray(pixels, np.uint8)
     height, width, _ = pixels.shape
-    raw = np.zeros((height, 1 + 3 * width), np.uint8)  # a zero filter byte before every row
-    raw[:, 1:] = pixels.reshape(height, -1)
+    plain = np.zeros((height, 1 + 3 * width), np.uint8)  # a filter byte before every row: 0 is none
+    plain[:, 1:] = pixels.reshape(height, -1)
+    differences = plain.copy()
+    differences[:, 0] = 1  # each pixel less the one before it, which suits renderings
+    differences[:, 4:] -= plain[:, 1:-3]
+    body = min((zlib.compress(rows.tobytes(), 9) for rows in (plain, differences)), key=len)
 
     def chunk(name, data):
         return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
 
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    data = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(raw.tobytes(), 6))
+    data = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", body)
     path = Path(path)
     work = path.with_name(f".{path.name}.tmp")
     work.write_bytes(data + chunk(b"IEND", b""))
@@ -109,6 +113,25 @@ def layout(selection, uv, size=900):
     canvas[count > 1] = OVERLAP
     rows, columns = _line_pixels(points, _border_edges(selection, uv), size)
     canvas[rows, columns] = BORDER
+    return canvas
+
+
+def point_layout(uv, colours, size=900):
+    """The UVs of points as (size, size, 3): a dot each in its colour, (n, 3) in 0..1."""
+    canvas = np.empty((size, size, 3), np.uint8)
+    canvas[:] = EMPTY
+    inside = np.isfinite(uv).all(axis=1)
+    uv, colours = uv[inside].astype(np.float64), (np.clip(colours[inside], 0, 1) * 255 + 0.5).astype(np.uint8)
+    radius = max(1.0, 0.6 * size / np.sqrt(max(len(uv), 1)))
+    reach = int(np.ceil(radius))
+    column, row = np.floor(uv[:, 0] * size).astype(np.int64), np.floor((1 - uv[:, 1]) * size).astype(np.int64)
+    for down in range(-reach, reach + 1):
+        for across in range(-reach, reach + 1):
+            if across * across + down * down > radius * radius:
+                continue
+            x, y = column + across, row + down
+            fits = (x >= 0) & (x < size) & (y >= 0) & (y < size)
+            canvas[y[fits], x[fits]] = colours[fits]
     return canvas
 
 

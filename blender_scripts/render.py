@@ -14,6 +14,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import addon_loader
+import render_points
 
 FIELD_OF_VIEW = math.radians(30)
 FILL = 0.92  # share of the picture that the model may take
@@ -50,6 +51,9 @@ def world_points(objects):
     graph = bpy.context.evaluated_depsgraph_get()
     clouds = []
     for obj in objects:
+        if is_cloud(obj):
+            clouds.append(render_points.world_points(obj))
+            continue
         evaluated = obj.evaluated_get(graph)
         mesh = evaluated.to_mesh()
         points = np.empty(3 * len(mesh.vertices), np.float32)
@@ -59,6 +63,10 @@ def world_points(objects):
         evaluated.to_mesh_clear()
     points = np.concatenate(clouds)
     return points[np.isfinite(points).all(axis=1)]
+
+
+def is_cloud(obj):
+    return addon_loader.load("targets").is_cloud(obj)
 
 
 def place_camera(scene, points, aspect):
@@ -119,19 +127,24 @@ def place_lights(scene, camera):
 
 
 def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=16):
-    """Renders objects through a UV map to a PNG file. Their materials and other objects' visibility are put back."""
+    """Renders objects through a UV map to a PNG file. Their materials and other objects' visibility are put back.
+
+    Clouds appear as a ball a point, in the colour of a plain checker at the point's UV.
+    """
     import addon_utils
     import bpy
 
     addon_utils.enable("cycles")
     scene = bpy.context.scene
     material = grid_material(uv_map, cells)
-    before = {obj: [slot.material for slot in obj.material_slots] for obj in objects}
+    clouds = [obj for obj in objects if is_cloud(obj)]
+    surfaces = [obj for obj in objects if obj not in clouds]
+    before = {obj: [slot.material for slot in obj.material_slots] for obj in surfaces}
     hidden = {obj: obj.hide_render for obj in scene.objects}
     old_world, old_camera = scene.world, scene.camera
     for obj in scene.objects:
         obj.hide_render = obj not in before
-    for obj in objects:
+    for obj in surfaces:
         if not obj.material_slots:
             obj.data.materials.append(None)
         for slot in obj.material_slots:
@@ -151,8 +164,11 @@ def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=
     scene.cycles.max_bounces = 3
     scene.cycles.use_denoising = False  # not in every build, and it would smear the grid's numbers
     scene.cycles.seed = 0
+    point_image = render_points.checker_image(cells)
+    point_material = render_points.point_material(material, uv_map, point_image)
     try:
-        bpy.ops.render.render(write_still=True)
+        with render_points.stand_ins(clouds, point_material, scene):
+            bpy.ops.render.render(write_still=True)
     finally:
         for obj, materials in before.items():
             if not materials:
@@ -170,7 +186,24 @@ def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=
         bpy.data.lights.remove(key_data)
         bpy.data.worlds.remove(world)
         bpy.data.materials.remove(material)
+        bpy.data.materials.remove(point_material)
+        bpy.data.images.remove(point_image)
         bpy.data.images.remove(image)
+
+
+def map_names(objects):
+    """Names of the UV maps that objects show: the active one of a surface, all of a cloud."""
+    names = set()
+    for obj in objects:
+        if is_cloud(obj):
+            names |= {a.name for a in obj.data.attributes if (a.domain, a.data_type) == ("POINT", "FLOAT2")}
+        elif obj.data.uv_layers.active:
+            names.add(obj.data.uv_layers.active.name)
+    return names
+
+
+def has_map(obj, name):
+    return name in (map_names([obj]) if is_cloud(obj) else obj.data.uv_layers)
 
 
 def main(argv):
@@ -188,12 +221,12 @@ def main(argv):
     if not 1 <= options.cells <= 64:
         parser.error("--cells must be within 1 and 64")
     try:
-        objects = [obj for obj in asset_io.load(options.input) if obj.data.polygons]
+        targets = addon_loader.load("targets")
+        objects = [obj for obj in asset_io.load(options.input) if targets.is_surface(obj) or targets.is_cloud(obj)]
         if not objects:
-            raise asset_io.AssetError("holds no faces")
-        maps = {obj.data.uv_layers.active.name for obj in objects if obj.data.uv_layers.active}
-        uv_map = options.uv_map or next(iter(sorted(maps)), None)
-        if uv_map is None or not all(uv_map in obj.data.uv_layers for obj in objects):
+            raise asset_io.AssetError("holds no faces and no points")
+        uv_map = options.uv_map or next(iter(sorted(map_names(objects))), None)
+        if uv_map is None or not all(has_map(obj, uv_map) for obj in objects):
             raise asset_io.AssetError(f"has no UV map {uv_map!r}" if uv_map else "has no UV map; unwrap it first")
         Path(options.output).resolve().parent.mkdir(parents=True, exist_ok=True)
         render_objects(objects, options.output, uv_map, size=options.size, samples=options.samples, cells=options.cells)

@@ -1,4 +1,4 @@
-"""Unwrap mesh files without a window.
+"""Unwrap files of meshes and point clouds without a window.
 
 blender -b -P blender_scripts/unwrap.py -- IN... -o OUT [--report report.json] [settings]
 python blender_scripts/unwrap.py IN... -o OUT [--report report.json] [settings]

@@ -33,6 +33,7 @@ MAY_USE = {
     "report": {"metrics"},
     # What sees the whole.
     "pipeline": None,
+    "cloud": None,
     "standalone": None,
     "settings": None,
     "error": None,
@@ -165,7 +166,8 @@ def test_core_neither_prints_nor_opens_files():
         for file in library_files()
         for match in [forbidden.search(without_comments_and_tests(file.read_text(encoding="utf-8")))]
         if match
-        and not (match[0] == "Instant::now" and module_path(file)[:1] == ("pipeline",))  # seconds of the report
+        # Seconds of the report.
+        and not (match[0] == "Instant::now" and module_path(file)[:1] in {("pipeline",), ("cloud",)})
     ]
     assert not found
 
@@ -173,7 +175,7 @@ def test_core_neither_prints_nor_opens_files():
 @pytest.mark.parametrize(
     ("crate", "allowed"),
     [
-        ("ble_unwrap_core", {"faer", "nalgebra", "rayon", "robust", "thiserror"}),
+        ("ble_unwrap_core", {"faer", "nalgebra", "pulp", "rayon", "robust", "thiserror"}),
         ("ble_unwrap_fixtures", {"toml", "serde"}),
         ("ble_unwrap_native", {"ble_unwrap_core", "pyo3", "rayon"}),
     ],
@@ -224,13 +226,17 @@ def tops(names: set[str]) -> set[str]:
 
 # File of the add-on -> what it never imports.
 NEVER = {
-    "mesh_bridge.py": {".engine", "ble_unwrap_native"},
+    "mesh_bridge.py": {".engine", ".cloud_bridge", "ble_unwrap_native"},
+    "cloud_bridge.py": {".engine", "ble_unwrap_native"},
+    "point_file.py": {"bpy", "bmesh", ".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "targets.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "cloud_report.py": {"bpy", "bmesh", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
     "operators": {"ble_unwrap_native"},
-    "panel.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
-    "menu.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
-    "preferences.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
-    "properties.py": {".engine", ".mesh_bridge", "ble_unwrap_native"},
-    "engine.py": {"bpy", "bmesh", ".mesh_bridge", ".operators", ".properties"},
+    "panel.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "menu.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "preferences.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "properties.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
+    "engine.py": {"bpy", "bmesh", ".mesh_bridge", ".cloud_bridge", ".operators", ".properties"},
 }
 
 
@@ -247,6 +253,27 @@ def test_python_layers(file):
         allowed = {"bpy", "bmesh", "mathutils", "numpy", "addon_utils", "bl_ext", "gpu", "ble_unwrap_native"}
         foreign = {n for n in names if not n.startswith(".")} - allowed - set(sys.stdlib_module_names)
         assert not foreign, "an extension has only Blender's Python; its own modules are imported relatively"
+
+
+PACKAGE = ROOT / "native/ble_unwrap_native/python/ble_unwrap_native"
+# Module of the Python package around the native one -> what it may import besides the standard library. Blender's
+# Python has no scikit-learn, and the package shall load where there is no NumPy either.
+PACKAGE_MAY_IMPORT = {
+    "__init__.py": {"._native"},
+    "estimator.py": {".", "joblib", "numpy", "scipy", "sklearn"},
+}
+
+
+@pytest.mark.parametrize("file", sorted(PACKAGE.glob("*.py")), ids=lambda f: f.name)
+def test_package_layers(file):
+    assert file.name in PACKAGE_MAY_IMPORT, "the module is not in the table of layers"
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), str(file))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found.add("." * node.level + (node.module or "") if node.level else node.module.split(".")[0])
+    assert found - set(sys.stdlib_module_names) <= PACKAGE_MAY_IMPORT[file.name]
 
 
 # The test itself ----------------------------------------------------------------------------------------------------

@@ -6,7 +6,6 @@ import ast
 import ctypes
 import gc
 import io
-import itertools
 import subprocess
 import sys
 import tomllib
@@ -296,7 +295,7 @@ def test_a_given_setting_beats_the_preset(ball):
         ("seed", True, "found True"),
         ("holes", "fill", "holes: expected 'keep' or 'cut'; found 'fill'"),
         ("model", 3, "model: expected 'default', 'paper' or 'isomap'; found 3"),
-        ("preset", "best", "preset: expected 'default' or 'paper'; found 'best'"),
+        ("preset", "best", "preset: expected 'default', 'paper' or 'iso_charts'; found 'best'"),
         ("kernel_width", 0, "or None for the model's own; found 0"),
         ("landmark_min", 2, "landmark_min: expected a whole number from 3 to 100000; found 2"),
         ("landmark_max", 1, "or None for no limit; found 1"),
@@ -322,7 +321,7 @@ def test_unknown_settings_are_named_with_near_ones(square):
         unwrap(*square, zzz=1)
     with pytest.raises(native.InvalidArgumentError, match=r"pack\(\) has no setting 'stretch_limit'"):
         native.pack(np.zeros((0, 2)), np.zeros((0, 3), np.int32), np.zeros(0, np.int32), stretch_limit=1.2)
-    with pytest.raises(native.InvalidArgumentError, match="preset: expected 'default' or 'paper'"):
+    with pytest.raises(native.InvalidArgumentError, match="preset: expected 'default', 'paper' or 'iso_charts'"):
         native.default_settings("artist")
 
 
@@ -332,42 +331,6 @@ def test_settings_that_contradict_each_other_are_named(square):
 
 
 # The single steps ---------------------------------------------------------------------------------------------------
-
-
-def test_geodesic_distances_on_a_flat_sheet():
-    positions, corners, offsets = sheet = grid(24, 16)
-    sources = np.array([0, 24, 212])
-    d = np.asarray(native.geodesic_distances(*sheet, sources))
-    assert d.shape == (3, len(positions)) and d.dtype == np.float32
-    exact = np.linalg.norm(positions[sources, None] - positions[None], axis=-1)
-    np.testing.assert_allclose(d, exact, atol=1e-5)
-    along_edges = np.asarray(native.geodesic_distances(*sheet, sources, geodesics="dijkstra", threads=1))
-    assert (along_edges >= d - 1e-5).all() and along_edges.max() > d.max() + 0.01
-    scaled = native.geodesic_distances(1e3 * positions + 7, corners, offsets, sources)
-    np.testing.assert_allclose(np.asarray(scaled), 1e3 * exact, atol=1e-2)
-
-
-def test_geodesic_distances_that_do_not_exist_are_infinite():
-    positions, corners, offsets = grid(2, 2)
-    two = (
-        np.concatenate([positions, positions + 5, [[9, 9, 9]]]),
-        np.concatenate([corners, corners + len(positions)]),
-        np.concatenate([offsets, offsets[1:] + len(corners)]),
-    )
-    d = np.asarray(native.geodesic_distances(*two, np.array([0, 18])))
-    assert np.isfinite(d[0, :9]).all() and np.isinf(d[0, 9:]).all()
-    assert d[1, 18] == 0 and np.isinf(d[1, :18]).all()
-
-
-def test_geodesic_distances_name_what_is_wrong(square):
-    with pytest.raises(native.InvalidArgumentError, match="source 1 is vertex 4, but the vertices are numbered 0 to 4"):
-        native.geodesic_distances(*square, np.array([0, 4]))
-    with pytest.raises(native.InvalidArgumentError, match=r"sources: expected an int32 or int64 array of shape \(k,\)"):
-        native.geodesic_distances(*square, 0)
-    with pytest.raises(native.InvalidArgumentError, match=r"geodesic_distances\(\) has no setting 'model'"):
-        native.geodesic_distances(*square, np.array([0]), model="paper")
-    with pytest.raises(native.InvalidMeshError, match="vertex 9"):
-        native.geodesic_distances(square[0], np.array([0, 1, 3, 9]), square[2], np.array([0]))
 
 
 def test_measure_agrees_with_the_report_of_unwrap(ball):
@@ -441,55 +404,6 @@ def test_pack_names_what_is_wrong():
     triangle = np.array([[0.0, 0], [1, 0], [0, 1]])
     with pytest.raises(native.InvalidArgumentError, match="margin"):
         native.pack(triangle, np.array([[0, 1, 2]]), np.array([0]), texture_size=8, margin=100)
-
-
-def distances_of(points):
-    return np.linalg.norm(points[:, None] - points[None], axis=-1)
-
-
-@pytest.mark.parametrize("kind", ["points", "distances"])
-def test_embed_reproduces_points_of_the_plane(kind):
-    points = np.random.default_rng(3).random((60, 2))
-    lifted = points @ np.linalg.qr(np.random.default_rng(4).normal(size=(5, 5)))[0][:2]
-    data = lifted if kind == "points" else distances_of(lifted)
-    result = native.embed(data, kind=kind, tolerance=1e-12, max_sweeps=500)
-    found = np.asarray(result.coordinates) * np.sqrt(result.report["sigma"])
-    assert found.shape == (60, 2) and found.dtype == np.float64
-    np.testing.assert_allclose(distances_of(found), distances_of(points), atol=1e-4)
-    assert np.asarray(result.intercepts).shape == (60,)
-    trace = result.report["trace"]
-    assert all(b >= a - 1e-9 * abs(a) for a, b in itertools.pairwise(trace)), "the likelihood fell"
-    assert result.report["log_likelihood"] == trace[-1] and result.report["bregman"] >= -1e-6
-
-
-def test_embed_the_printed_model_from_affinities():
-    points = np.random.default_rng(5).random((40, 3))
-    affinity = np.exp(-4 * distances_of(points) ** 2)
-    settings = {"preset": "paper", "seed": 7, "max_sweeps": 30, "threads": 2}
-    result = native.embed(affinity, kind="affinities", dimensions=3, **settings)
-    assert result.coordinates.shape == (40, 3) and result.intercepts.shape == (0,)
-    assert result.report["sigma"] == 1 and 1 <= result.report["sweeps"] <= 30
-    again = native.embed(affinity, kind="affinities", dimensions=3, **settings)
-    assert bytes(again.coordinates) == bytes(result.coordinates)
-    other = native.embed(affinity, kind="affinities", dimensions=3, **(settings | {"seed": 8}))
-    assert bytes(other.coordinates) != bytes(result.coordinates)
-
-
-def test_embed_names_what_is_wrong():
-    points = np.random.default_rng(6).random((10, 2))
-    with pytest.raises(native.InvalidArgumentError, match=r"a square matrix of distances, found shape \(10, 2\)"):
-        native.embed(points, kind="distances")
-    with pytest.raises(native.InvalidArgumentError, match="kind: expected 'points', 'distances' or 'affinities'"):
-        native.embed(points, kind="graph")
-    with pytest.raises(native.InvalidArgumentError, match="10 points do not span 10 dimensions"):
-        native.embed(points, dimensions=10)
-    with pytest.raises(native.InvalidArgumentError, match="dimensions: expected a whole number from 1 to"):
-        native.embed(points, dimensions=-1)
-    with pytest.raises(native.InvalidArgumentError, match="Isomap"):
-        native.embed(points, model="isomap")
-    points[3, 1] = np.inf
-    with pytest.raises(native.InvalidArgumentError, match="component 1 of point 3"):
-        native.embed(points)
 
 
 def test_single_steps_take_a_job(hill):

@@ -4,8 +4,9 @@ import json
 
 import bpy
 
-from .. import engine, mesh_bridge, preferences, properties
-from ..task import UnwrapTask
+from .. import engine, mesh_bridge, preferences, properties, targets
+from ..panel import panel_settings
+from ..run import Run
 
 # The add-on's failures that are the user's business; anything else is a bug and may show its traceback.
 USER_ERRORS = (mesh_bridge.MeshError, engine.EngineMissing, engine.EngineError)
@@ -31,7 +32,8 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
     bl_idname = "uv.ble_unwrap"
     bl_label = "BLE Unwrap"
     bl_description = (
-        "Cut, flatten and pack the mesh so that no chart is stretched beyond a limit, without overlaps or flips"
+        "Cut, flatten and pack meshes and point clouds so that no chart is stretched beyond a limit, "
+        "without overlaps or flips"
     )
     bl_options = {"REGISTER", "UNDO"}
 
@@ -39,11 +41,11 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.mode not in {"EDIT_MESH", "OBJECT"}:
-            cls.poll_message_set("Works in Object Mode and in Edit Mode of a mesh")
+        if context.mode not in {"OBJECT", *targets.EDIT_MODES}:
+            cls.poll_message_set("Works in Object Mode and in Edit Mode of a mesh or point cloud")
             return False
-        if context.mode == "OBJECT" and not any(obj.type == "MESH" for obj in context.selected_objects):
-            cls.poll_message_set("Select a mesh object")
+        if context.mode == "OBJECT" and not any(obj.type in targets.TYPES for obj in context.selected_objects):
+            cls.poll_message_set("Select a mesh or a point cloud")
             return False
         return True
 
@@ -52,18 +54,18 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
         if bpy.app.background:
             return self.execute(context)
         try:
-            task = self._task(context)
-            if task.selection.face_count < preferences.preference(context, "modal_threshold"):
-                return self._finish(context, task, task.run())
-            self._start(context, task)
+            run = self._run(context)
+            if run.element_count < preferences.preference(context, "modal_threshold"):
+                return self._finish(context, run, run.run())
+            self._start(context, run)
         except USER_ERRORS as error:
             return self._fail(error)
         return {"RUNNING_MODAL"}
 
     def execute(self, context):
         try:
-            task = self._task(context)
-            return self._finish(context, task, task.run())
+            run = self._run(context)
+            return self._finish(context, run, run.run())
         except USER_ERRORS as error:
             return self._fail(error)
 
@@ -98,30 +100,33 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
         self._job.cancel()
         self._stop(context)
 
-    def draw(self, _context):
+    def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()
-        for name in ("preset", *properties.MAIN_SETTINGS):
+        for name in panel_settings(self, context, ("preset", *properties.MAIN_SETTINGS)):
             column.prop(self, name)
         for title, names in properties.ADVANCED_SETTINGS:
+            names = panel_settings(self, context, names)
+            if not names:
+                continue
             header, body = layout.panel(f"BLE_UNWRAP_{title}", default_closed=True)
             header.label(text=title)
             if body:
                 for name in names:
                     body.prop(self, name)
 
-    def _task(self, context):
-        return UnwrapTask(
-            mesh_bridge.target_objects(context),
+    def _run(self, context):
+        return Run(
+            targets.target_objects(context),
             properties.values(self.properties),
             threads=preferences.preference(context, "threads"),
         )
 
-    def _start(self, context, task):
-        self._running = task
-        self._job = task.start()
+    def _start(self, context, run):
+        self._running = run
+        self._job = run.start()
         self._cancel_requested = False
         self._cancel_polls = 0
         manager = context.window_manager
@@ -140,24 +145,42 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
         context.window_manager.progress_end()
         context.workspace.status_text_set(None)
 
-    def _finish(self, context, task, result):
-        outcome = task.write(result, measure_again=preferences.preference(context, "measure_again"))
+    def _finish(self, context, run, results):
+        outcomes = run.write(results, measure_again=preferences.preference(context, "measure_again"))
         shown = context.window_manager.ble_unwrap_certificate
-        shown.title = outcome.title
-        shown.lines = json.dumps(outcome.lines)
-        for text in outcome.certificate.warnings:
-            self.report({"WARNING"}, text)
-        if outcome.certificate.holds:
-            self.report({"INFO"}, f"BLE Unwrap: {outcome.summary}")
-        else:
-            broken = "; ".join(outcome.certificate.violations)
-            self.report({"WARNING"}, f"BLE Unwrap: {outcome.summary}. Not kept: {broken}")
+        shown.title = titles(outcomes)
+        shown.lines = json.dumps(certificate_lines(outcomes))
+        for outcome in outcomes:
+            for text in outcome.certificate.warnings:
+                self.report({"WARNING"}, text)
+        for outcome in outcomes:
+            name = f" {outcome.title}:" if len(outcomes) > 1 else ""
+            if outcome.certificate.holds:
+                self.report({"INFO"}, f"BLE Unwrap:{name} {outcome.summary}")
+            else:
+                broken = "; ".join(outcome.certificate.violations)
+                self.report({"WARNING"}, f"BLE Unwrap:{name} {outcome.summary}. Not kept: {broken}")
         redraw(context)
         return {"FINISHED"}
 
     def _fail(self, error):
         self.report({"ERROR"}, f"BLE Unwrap: {error}")
         return {"CANCELLED"}
+
+
+def titles(outcomes):
+    """What the result is of, in a few words."""
+    return outcomes[0].title if len(outcomes) == 1 else f"{sum(len(outcome.maps) for outcome in outcomes)} objects"
+
+
+def certificate_lines(outcomes):
+    """The lines of all certificates; below the name of each, where there are several."""
+    result = []
+    for outcome in outcomes:
+        if len(outcomes) > 1:
+            result.append(("HEAD", outcome.title))
+        result.extend(outcome.lines)
+    return result
 
 
 def redraw(context):

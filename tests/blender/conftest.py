@@ -53,3 +53,20 @@ def run_script(tmp_path):
         )
 
     return run
+
+
+@pytest.fixture
+def files(tmp_path, addon):
+    """Writes the present scene to a file of a format."""
+
+    def write(name):
+        path = tmp_path / name
+        if path.suffix == ".stl":
+            bpy.ops.wm.stl_export(filepath=str(path))
+        elif path.suffix == ".gltf":
+            bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLTF_SEPARATE")
+        else:
+            addon("asset_io").save(path)
+        return path
+
+    return write

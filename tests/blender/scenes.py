@@ -35,6 +35,7 @@ def n_gons(name="N-gons"):
 
 
 def select(*objects):
+    bpy.context.view_layer.update()  # before it, objects that were removed are still there, and new ones are not
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj in objects)
     bpy.context.view_layer.objects.active = objects[0]
@@ -114,3 +115,84 @@ def fingerprint(obj):
     mesh.edges.foreach_get("use_seam", seams)
     arrays = (positions, corners, *flags, materials, seams)
     return (obj.mode, obj.select_get(), *(a.tobytes() for a in arrays))
+
+
+def sheet_points(cells=20, bump=0.15, offset=(0.0, 0.0, 0.0)):
+    """Points of a bumpy sheet, (cells², 3), in a grid that is shaken so that no two distances are equal."""
+    random = np.random.default_rng(5)
+    t = np.linspace(0.0, 1.0, cells)
+    x, y = (a.reshape(-1) for a in np.meshgrid(t, t, indexing="ij"))
+    shake = random.uniform(-0.2, 0.2, (2, len(x))) / cells
+    x, y = x + shake[0], y + shake[1]
+    return np.stack([x, y, bump * np.sin(np.pi * x) * np.sin(np.pi * y)], axis=1) + offset
+
+
+def vertices_only(points=None, name="Points"):
+    """A mesh of vertices alone."""
+    return add_mesh(name, sheet_points() if points is None else points, [])
+
+
+def point_cloud(points=None, name="Cloud"):
+    """A point cloud object. Every Blender since 4.2 makes one by applying geometry nodes; no other way is in all."""
+    source = vertices_only(points, f"{name} source")
+    obj = bpy.data.objects.new(name, bpy.data.pointclouds.new(name))
+    bpy.context.collection.objects.link(obj)
+    tree = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    info, to_points = tree.nodes.new("GeometryNodeObjectInfo"), tree.nodes.new("GeometryNodeMeshToPoints")
+    out = tree.nodes.new("NodeGroupOutput")
+    info.inputs["Object"].default_value = source
+    tree.links.new(info.outputs["Geometry"], to_points.inputs["Mesh"])
+    tree.links.new(to_points.outputs["Points"], out.inputs[0])
+    obj.modifiers.new("points", "NODES").node_group = tree
+    select(obj)
+    bpy.ops.object.modifier_apply(modifier="points")
+    data = source.data
+    bpy.data.objects.remove(source)
+    bpy.data.meshes.remove(data)
+    bpy.data.node_groups.remove(tree)
+    for name in [a.name for a in obj.data.attributes if a.name.startswith(".select")]:
+        obj.data.attributes.remove(obj.data.attributes[name])
+    assert obj.type == "POINTCLOUD" and len(obj.data.points) == len(sheet_points() if points is None else points)
+    return obj
+
+
+def point_map(obj, name="UVMap"):
+    """The UVs of points that an attribute holds, (n, 2) float32; of an object that is not a mesh in edit mode."""
+    attribute = obj.data.attributes[name]
+    assert (attribute.domain, attribute.data_type) == ("POINT", "FLOAT2")
+    values = np.empty(2 * len(attribute.data), np.float32)
+    attribute.data.foreach_get("vector", values)
+    return values.reshape(-1, 2)
+
+
+def set_point_map(obj, values, name="UVMap"):
+    if name not in obj.data.attributes:
+        obj.data.attributes.new(name, "FLOAT2", "POINT")
+    obj.data.attributes[name].data.foreach_set("vector", np.asarray(values, np.float32).reshape(-1))
+
+
+def place_of_points(obj):
+    attribute = obj.data.attributes["position"]
+    values = np.empty(3 * len(attribute.data), np.float32)
+    attribute.data.foreach_get("vector", values)
+    return values.reshape(-1, 3)
+
+
+def attribute_names(obj):
+    """Attributes apart from Blender's own, which come and go with selection and edit mode."""
+    own = {"position", "radius", "sharp_face", "material_index"}
+    return sorted(a.name for a in obj.data.attributes if not a.name.startswith(".") and a.name not in own)
+
+
+def assert_points_mapped(obj, name="UVMap", which=slice(None)):
+    """Points have finite UVs within the square, and near ones stay near: the map is one of the surface."""
+    uv = point_map(obj, name)[which].astype(float)
+    assert np.isfinite(uv).all() and uv.min() >= 0 and uv.max() <= 1
+    points = place_of_points(obj)[which].astype(float)
+    middle = len(points) // 2
+    near = np.argsort(((points - points[middle]) ** 2).sum(axis=1))[1:5]
+    spread = np.ptp(uv, axis=0).max()
+    assert spread > 0.1
+    assert (np.linalg.norm(uv[near] - uv[middle], axis=1) < 0.25 * spread).all()
+    return uv

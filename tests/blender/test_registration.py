@@ -6,6 +6,7 @@ from pathlib import Path
 
 import addon_loader
 import bpy
+import numpy as np
 import pytest
 
 
@@ -19,6 +20,7 @@ def entries(menu, addon):
 def test_menus_have_one_entry_each(addon):
     assert entries("IMAGE_MT_uvs_unwrap", addon) == 1
     assert entries("VIEW3D_MT_object", addon) == 1
+    assert entries("VIEW3D_MT_edit_pointcloud", addon) == 1
     # From 4.3 on this menu shows the one above: an entry of its own would be there twice.
     assert entries("VIEW3D_MT_uv_map", addon) == int(bpy.app.version < (4, 3, 0))
 
@@ -39,13 +41,15 @@ def test_every_setting_has_a_tooltip(addon):
         assert len(text) > 10 and not text.endswith("."), name
 
 
-@pytest.mark.parametrize("preset", ["DEFAULT", "PAPER"])
+@pytest.mark.parametrize("preset", ["DEFAULT", "PAPER", "ISO_CHARTS"])
 def test_presets_are_those_of_the_native_module(addon, preset):
     properties, engine = addon("properties"), addon("engine")
     settings = bpy.context.scene.ble_unwrap
     settings.preset = preset
     shown = {
-        name: getattr(settings, name) for name in properties.annotations() if name not in properties.BRIDGE_SETTINGS
+        name: getattr(settings, name)
+        for name in properties.annotations()
+        if name not in (*properties.BRIDGE_SETTINGS, *properties.CLOUD_SETTINGS)
     }
     shown["texture_size"] = tuple(shown["texture_size"])
     ours = engine.native_settings(shown)
@@ -57,6 +61,34 @@ def test_presets_are_those_of_the_native_module(addon, preset):
     for name, value in theirs.items():
         expected = pytest.approx(value, rel=1e-6) if isinstance(value, float) else value
         assert ours[name] == expected, name
+
+
+def test_settings_of_surfaces_are_those_that_clouds_do_not_take(addon):
+    """The table in properties.py against the native module, setting by setting."""
+    properties, engine = addon("properties"), addon("engine")
+    points = np.random.default_rng(0).random((8, 3)).astype(np.float32)
+    defaults = properties.default_values()
+    for name in properties.annotations():
+        if name in properties.BRIDGE_SETTINGS:
+            continue
+        try:
+            engine.unwrap_points(points, {name: defaults[name]})
+            taken = True
+        except engine.EngineError:
+            taken = False
+        assert taken is (name not in properties.SURFACE_SETTINGS), name
+
+
+def test_neighbours_default_and_range_are_the_native_modules(addon):
+    engine, keywords = addon("engine"), addon("properties").annotations()["neighbours"].keywords
+    points = np.random.default_rng(0).random((40, 3)).astype(np.float32)
+    default = engine.unwrap_points(points, {}).uv
+    assert np.array_equal(engine.unwrap_points(points, {"neighbours": keywords["default"]}).uv, default)
+    for value in (keywords["min"], keywords["max"]):
+        engine.unwrap_points(points, {"neighbours": value})
+    for value in (keywords["min"] - 1, keywords["max"] + 1):
+        with pytest.raises(engine.EngineError, match="neighbours"):
+            engine.unwrap_points(points, {"neighbours": value})
 
 
 def test_choosing_a_preset_keeps_where_the_result_goes():

@@ -12,23 +12,6 @@ import pytest
 from scenes import assert_good, cube, grid, sphere, uvs
 
 
-@pytest.fixture
-def files(tmp_path, addon):
-    """Writes the present scene to a file of a format."""
-
-    def write(name):
-        path = tmp_path / name
-        if path.suffix == ".stl":
-            bpy.ops.wm.stl_export(filepath=str(path))
-        elif path.suffix == ".gltf":
-            bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLTF_SEPARATE")
-        else:
-            addon("asset_io").save(path)
-        return path
-
-    return write
-
-
 def read_png(path):
     """(h, w, 3) uint8 of an 8-bit RGB file, by the standard library."""
     data, position, body = path.read_bytes(), 8, b""
@@ -102,13 +85,13 @@ def test_some_failed_is_1_and_the_others_are_written(run_script, files, tmp_path
     assert statuses == ["ok", "failed", "failed"]
 
 
-def test_file_without_faces_is_1(run_script, tmp_path):
-    path = tmp_path / "points.obj"
-    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n")
+def test_file_of_edges_alone_is_1(run_script, tmp_path):
+    path = tmp_path / "wire.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2 3\n")
     done = run_script("unwrap.py", path, "-o", "out")
     assert done.returncode == 1, done.stdout
     assert "Traceback" not in done.stdout
-    assert "holds no" in done.stdout
+    assert "holds no faces and no points" in done.stdout
 
 
 def test_vertex_that_is_not_finite(run_script, files, tmp_path):

@@ -110,7 +110,7 @@ def test_linked_duplicates_are_unwrapped_once(addon):
     bpy.context.collection.objects.link(second)
     bpy.context.view_layer.update()
     select(first, second)
-    assert len(addon("mesh_bridge").target_objects(bpy.context)) == 1
+    assert len(addon("targets").target_objects(bpy.context)) == 1
     assert unwrap() == {"FINISHED"}
     assert_good(first)
 

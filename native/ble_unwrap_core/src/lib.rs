@@ -14,11 +14,14 @@
 //! | charts into the unit square | [`packing`] |
 //! | single precision, proof, figures | [`rounding`], [`verify()`], [`metrics`] |
 //!
+//! [`unwrap_points()`] does the same for point clouds ([`cloud`]).
+//!
 //! The paper: *Bernoulli Embedding Model and Its Application in Texture Mapping*, revised 2006. Where a
 //! stage follows it, its documentation names section and equation.
 #![forbid(unsafe_code)]
 
 pub mod charts;
+pub mod cloud;
 pub mod distortion;
 pub mod embedding;
 mod error;
@@ -37,6 +40,7 @@ pub mod standalone;
 pub mod stretch;
 mod verify;
 
+pub use cloud::{CloudError, CloudReport, PointAtlas, unwrap_points};
 pub use error::UnwrapError;
 pub use mesh::{MeshError, MeshInput};
 pub use pipeline::{Atlas, Rung, Rungs, unwrap};

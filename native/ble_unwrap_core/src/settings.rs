@@ -1,11 +1,19 @@
-//! Every parameter of the unwrapper, with the two presets of the paper and of practice.
+//! Every parameter of the unwrapper, with the presets of practice, of the paper and of the method it is compared with.
 
-use crate::embedding::EmbeddingSettings;
+use crate::embedding::{EmbeddingSettings, Model};
 use crate::error::UnwrapError;
 use crate::geodesics::GeodesicSettings;
 use crate::packing::PackSettings;
 use crate::segmentation::SegmentationSettings;
 use crate::stretch::StretchSettings;
+
+/// Patches of more vertices are embedded by landmarks in the presets of the paper, too. All distances of m vertices
+/// take some 20 m² bytes and 0.4 µs a pair (marching, sweeps): 80 MB and 1.5 s at 2,000, twice the paper's own face of
+/// "around 1,000 vertices"; every patch that is tried costs that again.
+const PAPER_TOGETHER_MAX: usize = 2_000;
+
+/// Most vertices of a patch whose distances to each other can be handled: 8 GB and minutes.
+pub(crate) const MOST_TOGETHER: usize = 20_000;
 
 /// What happens to the holes of a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,6 +50,9 @@ pub struct Settings {
     pub holes: Holes,
     /// Relative scale of charts.
     pub chart_scale: ChartScale,
+    /// Patches of at most so many vertices are embedded with all their vertices together, as the paper does, in
+    /// time and memory of the square of their number; larger ones by their landmarks. 0: always by landmarks.
+    pub together_max: usize,
     /// Seed of every random choice.
     pub seed: u64,
     /// Landmarks and geodesic distances.
@@ -66,6 +77,7 @@ impl Default for Settings {
             merge: true,
             holes: Holes::Keep,
             chart_scale: ChartScale::Uniform,
+            together_max: 0,
             seed: 0,
             geodesics: GeodesicSettings::default(),
             segmentation: SegmentationSettings::default(),
@@ -77,19 +89,31 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The paper as printed: its model from a random start, one vertex in a hundred a landmark (section 5.1; the
-    /// others are placed by regression), Sander's line searches, disks, two texels at 1024.
+    /// The paper as printed: landmarks, one vertex in a hundred, for cutting (section 5.1); its model from a random
+    /// start on all vertices of a patch together; Sander's line searches, disks, two texels at 1024.
+    ///
+    /// Above 2,000 vertices a patch is embedded by its landmarks, and the others are placed by regression: all pairs would
+    /// not fit in time and memory.
     #[must_use]
     pub fn paper() -> Self {
         Self {
             holes: Holes::Cut,
             coarse: false,
+            together_max: PAPER_TOGETHER_MAX,
             geodesics: GeodesicSettings::paper(),
             embedding: EmbeddingSettings::paper(),
             stretch: StretchSettings::paper(),
             packing: PackSettings::paper(),
             ..Self::default()
         }
+    }
+
+    /// What the paper is compared with: iso-charts (Zhou, Snyder, Guo, Shum 2004), the same pipeline and settings as
+    /// [`Settings::paper`] with Isomap in place of Bernoulli logistic embedding.
+    #[must_use]
+    pub fn iso_charts() -> Self {
+        let paper = Self::paper();
+        Self { embedding: EmbeddingSettings { model: Model::Isomap, ..paper.embedding.clone() }, ..paper }
     }
 }
 
@@ -105,7 +129,7 @@ impl Settings {
         let t = &self.stretch;
         let positive = "a positive number";
         let unit = "between 0 and 1";
-        let checks: [(&'static str, f64, bool, &'static str); 14] = [
+        let checks: [(&'static str, f64, bool, &'static str); 15] = [
             (
                 "stretch_limit",
                 self.stretch_limit,
@@ -120,6 +144,7 @@ impl Settings {
             ),
             ("landmark_min", g.landmark_min as f64, g.landmark_min >= 3, "at least 3"),
             ("landmark_max", g.landmark_max as f64, g.landmark_max >= g.landmark_min, "at least landmark_min"),
+            ("together_max", self.together_max as f64, self.together_max <= MOST_TOGETHER, "at most 20,000"),
             ("first_parts", s.first_parts as f64, s.first_parts >= 2, "at least 2"),
             ("later_parts", s.later_parts as f64, s.later_parts >= 2, "at least 2"),
             ("band", s.band, (0.0..=1.0).contains(&s.band), unit),
@@ -147,5 +172,23 @@ impl Settings {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_are_valid_and_iso_charts_differs_from_the_paper_in_its_model_only() {
+        for settings in [Settings::default(), Settings::paper(), Settings::iso_charts()] {
+            assert!(settings.validate().is_ok());
+        }
+        let mut settings = Settings::iso_charts();
+        assert_eq!(settings.embedding.model, Model::Isomap);
+        settings.embedding.model = Model::Paper;
+        assert_eq!(settings, Settings::paper());
+        let too_many = Settings { together_max: MOST_TOGETHER + 1, ..Settings::default() };
+        assert!(matches!(too_many.validate(), Err(UnwrapError::Setting { name: "together_max", .. })));
     }
 }

@@ -52,6 +52,19 @@ pub(crate) fn real_matrix(object: &Bound<'_, PyAny>, argument: Argument) -> PyRe
     Ok((values, rows, columns))
 }
 
+/// Real numbers, from float32 or float64 of shape (n,).
+pub(crate) fn reals(object: &Bound<'_, PyAny>, argument: Argument) -> PyResult<Vec<f64>> {
+    let view = View::new(object, argument, REALS)?;
+    if view.shape.len() != 1 {
+        return Err(view.refusal());
+    }
+    let mut values = view.reserve(view.rows())?;
+    for i in 0..view.rows() {
+        values.push(view.real([i, 0])?);
+    }
+    Ok(values)
+}
+
 /// Indices, from int32 or int64 of shape (n,); an int64 must fit 32 bits.
 pub(crate) fn indices(object: &Bound<'_, PyAny>, argument: Argument) -> PyResult<Vec<i32>> {
     let view = View::new(object, argument, INDICES)?;

@@ -2,11 +2,12 @@
 
 use std::fmt::Display;
 
-use ble_unwrap_core::UnwrapError;
 use ble_unwrap_core::embedding::EmbeddingError;
 use ble_unwrap_core::mesh::MeshError;
 use ble_unwrap_core::packing::PackError;
-use ble_unwrap_core::standalone::{DistancesError, LayoutError, RepackError};
+use ble_unwrap_core::standalone::{CloudDistancesError, DistancesError, FlattenError, LayoutError, RepackError};
+use ble_unwrap_core::stretch::StretchError;
+use ble_unwrap_core::{CloudError, UnwrapError};
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -143,6 +144,20 @@ impl Raised for UnwrapError {
     }
 }
 
+impl Raised for CloudError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Setting(error) => error.kind(),
+            Self::Pack(error) => error.kind(),
+            Self::Neighbours { .. }
+            | Self::NoFinitePoint { .. }
+            | Self::TooLarge { .. }
+            | Self::TooManySpecks { .. } => Kind::Argument,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
 impl Raised for EmbeddingError {
     fn kind(&self) -> Kind {
         match self {
@@ -156,7 +171,13 @@ impl Raised for EmbeddingError {
             | Self::DistanceOutOfRange { .. }
             | Self::AffinityOutOfRange { .. }
             | Self::TooFewPoints { .. }
-            | Self::NoLikelihood => Kind::Argument,
+            | Self::OutOfScale { .. }
+            | Self::TooFewPlaces { .. }
+            | Self::StartNotFinite { .. }
+            | Self::StartAtSaddle
+            | Self::Disconnected { .. }
+            | Self::TooManyPoints { .. }
+            | Self::WrongColumns { .. } => Kind::Argument,
             Self::Eigen(_) => Kind::Internal,
             Self::Cancelled(error) => error.kind(),
         }
@@ -168,6 +189,49 @@ impl Raised for DistancesError {
         match self {
             Self::Mesh(error) => error.kind(),
             Self::Source { .. } | Self::TooLarge { .. } => Kind::Argument,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
+impl Raised for FlattenError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Mesh(error) => error.kind(),
+            Self::Setting(error) => error.kind(),
+            Self::NoFaces
+            | Self::NoArea
+            | Self::NotFinite { .. }
+            | Self::Pieces { .. }
+            | Self::Closed
+            | Self::Handles { .. }
+            | Self::Pinched { .. }
+            | Self::DoubledEdge { .. } => Kind::Mesh,
+            Self::TooManyLandmarks { .. } => Kind::Argument,
+            // The data are distances of the mesh: what is wrong with them is wrong with it.
+            Self::Embedding(
+                EmbeddingError::TooFewLandmarks { .. }
+                | EmbeddingError::Unreachable { .. }
+                | EmbeddingError::NoExtent
+                | EmbeddingError::Collinear { .. },
+            ) => Kind::Mesh,
+            Self::Embedding(error) => error.kind(),
+            Self::Stretch(StretchError::NotInjective) => Kind::Mesh,
+            Self::Stretch(_) => Kind::Internal,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
+impl Raised for CloudDistancesError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::WrongLength { .. }
+            | Self::NotFinite { .. }
+            | Self::Source { .. }
+            | Self::NoNeighbours
+            | Self::TooLarge { .. }
+            | Self::Disconnected(_) => Kind::Argument,
             Self::Cancelled(error) => error.kind(),
         }
     }

@@ -6,7 +6,7 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use ble_unwrap_core::{Progress, Stage};
@@ -287,9 +287,16 @@ impl Drop for Job {
     }
 }
 
+/// Whether this process was forked from one that had used the shared threads, which a fork does not bring along.
+fn forked() -> bool {
+    static OWNER: OnceLock<u32> = OnceLock::new();
+    let here = std::process::id();
+    *OWNER.get_or_init(|| here) != here
+}
+
 /// Runs `work` with at most `threads` threads of its own, or on the shared ones if that is 0.
 fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T, Failure> + Send) -> Result<T, Failure> {
-    if threads == 0 {
+    if threads == 0 && !forked() {
         return work();
     }
     let pool = rayon::ThreadPoolBuilder::new()

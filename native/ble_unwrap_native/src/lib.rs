@@ -1,13 +1,16 @@
 //! Python bindings of BLE Unwrap: converts, calls the core, converts back. Registration alone is here.
 
 mod arrays;
+mod cloud;
 mod distances;
 mod embed;
 mod errors;
+mod flatten;
 mod job;
 mod measure;
 mod owned_array;
 mod pack;
+mod place;
 mod report;
 mod settings;
 mod unwrap;
@@ -21,9 +24,13 @@ mod native {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use crate::distances::geodesic_distances;
+    use crate::cloud::{PointAtlas, submit_unwrap_points, unwrap_points};
+    #[pymodule_export]
+    use crate::distances::{geodesic_distances, graph_distances};
     #[pymodule_export]
     use crate::embed::{Embedding, embed};
+    #[pymodule_export]
+    use crate::flatten::{Flattening, flatten};
     #[pymodule_export]
     use crate::job::Job;
     #[pymodule_export]
@@ -32,6 +39,8 @@ mod native {
     use crate::owned_array::Array;
     #[pymodule_export]
     use crate::pack::{PackedCharts, pack};
+    #[pymodule_export]
+    use crate::place::place;
     #[pymodule_export]
     use crate::settings::default_settings;
     #[pymodule_export]

@@ -85,7 +85,7 @@ pub(crate) fn measures_to_dict(py: Python<'_>, layout: LayoutMeasures) -> PyResu
 }
 
 /// A dictionary of named numbers, those of one name added up.
-fn sums<'py, T>(py: Python<'py>, pairs: &[(&'static str, T)]) -> PyResult<Bound<'py, PyDict>>
+pub(crate) fn sums<'py, T>(py: Python<'py>, pairs: &[(&'static str, T)]) -> PyResult<Bound<'py, PyDict>>
 where
     T: Copy + std::ops::Add<Output = T> + IntoPyObject<'py>,
 {

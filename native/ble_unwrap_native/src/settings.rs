@@ -22,6 +22,7 @@ impl Call {
         let settings = match preset {
             Preset::Default => Settings::default(),
             Preset::Paper => Settings::paper(),
+            Preset::IsoCharts => Settings::iso_charts(),
         };
         Self { settings, threads: 0 }
     }
@@ -34,14 +35,21 @@ pub(crate) enum Preset {
     Default,
     /// The paper as printed.
     Paper,
+    /// The same with Isomap, which the paper compares itself with.
+    IsoCharts,
 }
 
 /// The functions that take settings. A setting that a function has no use for is an error there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Function {
     Unwrap,
+    UnwrapPoints,
     Embed,
+    Flatten,
+    Transform,
+    Place,
     GeodesicDistances,
+    GraphDistances,
     Measure,
     Pack,
 }
@@ -50,8 +58,13 @@ impl Function {
     fn name(self) -> &'static str {
         match self {
             Self::Unwrap => "unwrap",
+            Self::UnwrapPoints => "unwrap_points",
             Self::Embed => "embed",
+            Self::Flatten => "flatten",
+            Self::Transform => "transform",
+            Self::Place => "place",
             Self::GeodesicDistances => "geodesic_distances",
+            Self::GraphDistances => "graph_distances",
             Self::Measure => "measure",
             Self::Pack => "pack",
         }
@@ -116,38 +129,55 @@ impl Interval {
 
 /// Most threads one call may ask for: several times the largest machines, far below what exhausts one.
 const MOST_THREADS: usize = 1024;
+/// Most vertices embedded together: the core handles the distances of no more.
+const MOST_TOGETHER: usize = 20_000;
 /// Largest texture side the packer takes.
 const MOST_TEXELS: u32 = PackSettings::LARGEST_SIZE;
 
 const UNWRAP: &[Function] = &[];
-const EMBED: &[Function] = &[Function::Embed];
-const GEODESICS: &[Function] = &[Function::GeodesicDistances];
-const PACK: &[Function] = &[Function::Pack];
-const TEXTURE: &[Function] = &[Function::Measure, Function::Pack];
-const ALL: &[Function] = &[Function::Embed, Function::GeodesicDistances, Function::Measure, Function::Pack];
+const CLOUD: &[Function] = &[Function::UnwrapPoints];
+const FLATTEN: &[Function] = &[Function::Flatten];
+const LANDMARKS: &[Function] = &[Function::Flatten, Function::UnwrapPoints];
+const EMBED: &[Function] = &[Function::Embed, Function::Flatten, Function::UnwrapPoints];
+const MODEL: &[Function] = &[Function::Embed, Function::Place, Function::Flatten, Function::UnwrapPoints];
+const GEODESICS: &[Function] = &[Function::GeodesicDistances, Function::Flatten];
+const PACK: &[Function] = &[Function::Pack, Function::UnwrapPoints];
+const TEXTURE: &[Function] = &[Function::Measure, Function::Pack, Function::UnwrapPoints];
+const ALL: &[Function] = &[
+    Function::Embed,
+    Function::Transform,
+    Function::Place,
+    Function::Flatten,
+    Function::GeodesicDistances,
+    Function::GraphDistances,
+    Function::Measure,
+    Function::Pack,
+    Function::UnwrapPoints,
+];
 
 #[rustfmt::skip] // a table: one row a setting
 const TABLE: &[Setting] = &[
-    row("stretch_limit", Field::Real(|c| &mut c.settings.stretch_limit, Interval::above(1.0, 1e3)), UNWRAP),
-    row("weld", Field::Flag(|c| &mut c.settings.weld), UNWRAP),
-    row("coarse", Field::Flag(|c| &mut c.settings.coarse), UNWRAP),
+    row("stretch_limit", Field::Real(|c| &mut c.settings.stretch_limit, Interval::above(1.0, 1e3)), CLOUD),
+    row("weld", Field::Flag(|c| &mut c.settings.weld), FLATTEN),
+    row("coarse", Field::Flag(|c| &mut c.settings.coarse), CLOUD),
     row("merge", Field::Flag(|c| &mut c.settings.merge), UNWRAP),
     row("holes", Field::Word(|c| &mut c.settings.holes), UNWRAP),
     row("chart_scale", Field::Word(|c| &mut c.settings.chart_scale), UNWRAP),
     row("seed", Field::Seed(|c| &mut c.settings.seed), EMBED),
     row("geodesics", Field::Word(|c| &mut c.settings.geodesics.metric), GEODESICS),
-    row("landmark_fraction", Field::Real(|c| &mut c.settings.geodesics.landmark_fraction, Interval::above(0.0, 1.0)), UNWRAP),
-    row("landmark_min", Field::Whole(|c| &mut c.settings.geodesics.landmark_min, [3, 100_000]), UNWRAP),
-    row("landmark_max", Field::Limit(|c| &mut c.settings.geodesics.landmark_max, [3, 100_000]), UNWRAP),
-    row("model", Field::Word(|c| &mut c.settings.embedding.model), EMBED),
+    row("landmark_fraction", Field::Real(|c| &mut c.settings.geodesics.landmark_fraction, Interval::above(0.0, 1.0)), LANDMARKS),
+    row("landmark_min", Field::Whole(|c| &mut c.settings.geodesics.landmark_min, [3, 100_000]), LANDMARKS),
+    row("landmark_max", Field::Limit(|c| &mut c.settings.geodesics.landmark_max, [3, 100_000]), LANDMARKS),
+    row("together_max", Field::Whole(|c| &mut c.settings.together_max, [0, MOST_TOGETHER]), FLATTEN),
+    row("model", Field::Word(|c| &mut c.settings.embedding.model), MODEL),
     row("kernel_width", Field::OptionalReal(|c| &mut c.settings.embedding.kernel_width, Interval::above(0.0, 1e3)), EMBED),
     row("relaxation", Field::Real(|c| &mut c.settings.embedding.relaxation, Interval::between(0.0, 2.0)), EMBED),
     row("max_sweeps", Field::Whole(|c| &mut c.settings.embedding.max_sweeps, [1, 100_000]), EMBED),
     row("tolerance", Field::Real(|c| &mut c.settings.embedding.tolerance, Interval::between(0.0, 1.0)), EMBED),
     row("update", Field::Word(|c| &mut c.settings.embedding.update), EMBED),
     row("initial", Field::Word(|c| &mut c.settings.embedding.initial), EMBED),
-    row("stretch_solver", Field::Word(|c| &mut c.settings.stretch.solver), UNWRAP),
-    row("stretch_iterations", Field::Whole(|c| &mut c.settings.stretch.max_iterations, [1, 100_000]), UNWRAP),
+    row("stretch_solver", Field::Word(|c| &mut c.settings.stretch.solver), FLATTEN),
+    row("stretch_iterations", Field::Whole(|c| &mut c.settings.stretch.max_iterations, [1, 100_000]), FLATTEN),
     row("margin", Field::Real(|c| &mut c.settings.packing.margin_texels, Interval::closed(0.0, 1024.0)), TEXTURE),
     row("texture_size", Field::Size(|c| [&mut c.settings.packing.width, &mut c.settings.packing.height], [1, MOST_TEXELS]), TEXTURE),
     row("rotation", Field::Word(|c| &mut c.settings.packing.rotation), PACK),
@@ -185,8 +215,9 @@ pub(crate) fn from_keywords(keywords: Option<&Bound<'_, PyDict>>, function: Func
 ///
 /// Parameters
 /// ----------
-/// preset : {"default", "paper"}
-///     ``"default"`` is for use; ``"paper"`` is the published method as printed.
+/// preset : {"default", "paper", "iso_charts"}
+///     ``"default"`` is for use; ``"paper"`` is the published method as printed; ``"iso_charts"`` the same with Isomap, which
+///     the paper compares itself with.
 ///
 /// Returns
 /// -------
@@ -221,7 +252,7 @@ impl Setting {
         let name = self.name;
         match &self.field {
             Field::Flag(field) => {
-                *field(call) = value.extract().map_err(|_| refusal(name, "True or False", value))?;
+                *field(call) = flag(name, value)?;
             }
             Field::Real(field, interval) => *field(call) = real(name, value, *interval, "")?,
             Field::OptionalReal(field, interval) => {
@@ -269,9 +300,25 @@ impl Setting {
     }
 }
 
+/// A yes or no.
+pub(crate) fn flag(name: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    value.extract().map_err(|_| refusal(name, "True or False", value))
+}
+
 fn real(name: &str, value: &Bound<'_, PyAny>, interval: Interval, or: &str) -> PyResult<f64> {
     let found = value.extract().ok().filter(|&x: &f64| interval.contains(x));
     found.ok_or_else(|| refusal(name, &format!("{}{or}", interval.text()), value))
+}
+
+/// A number; its range is the core's to check.
+pub(crate) fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    value.extract().map_err(|_| refusal(name, "a number", value))
+}
+
+/// A finite number above 0; `or` ends its description.
+pub(crate) fn positive(name: &str, value: &Bound<'_, PyAny>, or: &str) -> PyResult<f64> {
+    let found = value.extract().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
+    found.ok_or_else(|| refusal(name, &format!("a number above 0{or}"), value))
 }
 
 /// A whole number within a range; `unit` ends the description of the range.
@@ -291,7 +338,8 @@ pub(crate) fn set_word(name: &str, target: &mut dyn Words, value: &Bound<'_, PyA
     if known { Ok(()) } else { Err(refusal(name, &crate::words::listed(&target.words()), value)) }
 }
 
-fn refusal(name: &str, expected: &str, value: &Bound<'_, PyAny>) -> PyErr {
+/// The error for a value that is not what it has to be.
+pub(crate) fn refusal(name: &str, expected: &str, value: &Bound<'_, PyAny>) -> PyErr {
     let found = value.repr().map_or_else(|_| "an object that cannot be shown".into(), |text| text.to_string());
     InvalidArgumentError::new_err(format!("{name}: expected {expected}; found {found}"))
 }

@@ -115,8 +115,9 @@ fn start(job: &Job, mesh: MeshArrays, call: Call) -> PyResult<()> {
 ///     Edges to be cut, by their two vertices. Pairs that are no edge do nothing.
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
-/// preset : {"default", "paper"}
-///     Where settings that are not given come from. ``"paper"``: the published method as printed.
+/// preset : {"default", "paper", "iso_charts"}
+///     Where settings that are not given come from. ``"paper"``: the published method as printed; ``"iso_charts"``: the same
+///     with Isomap, which the paper compares itself with.
 /// stretch_limit : float, above 1
 ///     Upper bound of the L2 stretch of every chart. 1 is isometric; the default is 1.1.
 /// weld : bool
@@ -135,6 +136,9 @@ fn start(job: &Job, mesh: MeshArrays, call: Call) -> PyResult<()> {
 ///     How distances on the surface are measured.
 /// landmark_fraction, landmark_min, landmark_max : float, int, int or None
 ///     Number of landmarks of a piece of surface: this share of its vertices, within these bounds.
+/// together_max : int
+///     Pieces of at most so many vertices are embedded with all their vertices together, as in the paper, at a cost of
+///     their square; larger ones by their landmarks. 0, the default: always by landmarks; 2,000 in the paper's presets.
 /// model : {"default", "paper", "isomap"}
 ///     How landmarks are embedded in the plane: Bernoulli logistic embedding with intercepts, the model as printed, or
 ///     classical scaling of geodesic distances.

@@ -1,12 +1,13 @@
 //! The words by which Python names the choices of the core.
 
-use ble_unwrap_core::embedding::{Initial, Model, Update};
+use ble_unwrap_core::embedding::{Evidence, Initial, Model, Update};
 use ble_unwrap_core::geodesics::Metric;
 use ble_unwrap_core::packing::Rotation;
+use ble_unwrap_core::standalone::Connect;
 use ble_unwrap_core::stretch::Solver;
 use ble_unwrap_core::{ChartScale, Holes};
 
-use crate::embed::DataKind;
+use crate::embed::{DataKind, PointDistance};
 use crate::settings::Preset;
 
 /// A choice that has a word for each of its values.
@@ -44,9 +45,12 @@ macro_rules! words {
 }
 
 words!(DataKind { "points" => Points, "distances" => Distances, "affinities" => Affinities });
-words!(Preset { "default" => Default, "paper" => Paper });
+words!(Evidence { "distances" => SquaredDistances, "affinities" => Affinities });
+words!(PointDistance { "euclidean" => Euclidean, "geodesic" => Geodesic });
+words!(Preset { "default" => Default, "paper" => Paper, "iso_charts" => IsoCharts });
 words!(Holes { "keep" => Keep, "cut" => Cut });
 words!(ChartScale { "uniform" => Uniform, "stretch" => Stretch });
+words!(Connect { "error" => Error, "bridge" => Bridge, "separate" => Separate });
 words!(Metric { "fast_marching" => FastMarching, "dijkstra" => Dijkstra });
 words!(Model { "default" => Default, "paper" => Paper, "isomap" => Isomap });
 words!(Update { "serial" => Serial, "parallel" => Parallel });

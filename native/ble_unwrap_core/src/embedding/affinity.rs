@@ -1,5 +1,7 @@
 //! Affinities: how strongly two points belong together, from their distance.
 
+use rayon::prelude::*;
+
 use crate::Progress;
 
 use super::EmbeddingError;
@@ -29,8 +31,39 @@ impl Kernel {
         }
     }
 
+    /// log(p/(1−p)) of the affinity p of two points with d²/2σ = `u`: exact however small p is; finite for finite `u`,
+    /// distances next to 0 being taken as a little more.
+    pub(super) fn log_odds(self, u: f64) -> f64 {
+        match self {
+            Self::Gaussian => -u - (-(-u.max(1e-12)).exp_m1()).ln(),
+            Self::Logistic => -u,
+        }
+    }
+
+    /// The inverse of [`Kernel::affinity`]: d²/2σ, with affinities within 1e-12 of 0 or 1 taken as that near.
+    /// Negative under the logistic kernel where p > ½, which classical scaling allows.
+    pub(super) fn scaled_square(self, p: f64) -> f64 {
+        match self {
+            Self::Gaussian => -p.max(1e-12).ln(),
+            Self::Logistic => -log_odds(p),
+        }
+    }
+
+    /// Whether affinities below `least` may be dropped.
+    pub(super) fn check_truncation(self, least: f64) -> Result<(), EmbeddingError> {
+        if least >= 0.0 && least < self.at_zero() {
+            return Ok(());
+        }
+        Err(EmbeddingError::InvalidSetting {
+            name: "truncation",
+            value: least,
+            expected: "not negative, and below the affinity at distance 0 (1 for the Gaussian kernel, 0.5 for the logistic \
+                       one)",
+        })
+    }
+
     /// Affinity of a point with itself.
-    fn at_zero(self) -> f64 {
+    pub(super) fn at_zero(self) -> f64 {
         match self {
             Self::Gaussian => 1.0,
             Self::Logistic => 0.5,
@@ -57,16 +90,16 @@ impl KernelWidth {
     pub fn validate(self, kernel: Kernel) -> Result<(), EmbeddingError> {
         match self {
             Self::Absolute(value) if !(value > 0.0 && value.is_finite()) => {
-                Err(EmbeddingError::InvalidSetting { name: "kernel_width", value, expected: "positive and finite" })
+                Err(EmbeddingError::InvalidSetting { name: "sigma", value, expected: "positive and finite" })
             }
             Self::Relative(value) if !(value > 0.0 && value.is_finite()) => {
                 Err(EmbeddingError::InvalidSetting { name: "kernel_width", value, expected: "positive and finite" })
             }
             Self::MeanAffinity(value) if !(value > 0.0 && value < kernel.at_zero()) => {
                 Err(EmbeddingError::InvalidSetting {
-                    name: "mean affinity",
+                    name: "mean_affinity",
                     value,
-                    expected: "above 0 and below the affinity at distance 0",
+                    expected: "above 0 and below the affinity at distance 0 (1 for the Gaussian kernel, 0.5 for the logistic one)",
                 })
             }
             _ => Ok(()),
@@ -107,6 +140,22 @@ impl Affinity {
         Ok(Self { n, values, sigma: 1.0 })
     }
 
+    /// Takes a symmetric matrix of values in [0, 1] as it is.
+    pub(super) fn symmetric(values: Vec<f64>, n: usize, sigma: f64) -> Self {
+        debug_assert_eq!(values.len(), n * n);
+        Self { n, values, sigma }
+    }
+
+    /// Mirrors the lower triangle.
+    pub(super) fn from_lower_triangle(mut values: Vec<f64>, n: usize, sigma: f64) -> Self {
+        for i in 0..n {
+            for j in 0..i {
+                values[j * n + i] = values[i * n + j];
+            }
+        }
+        Self::symmetric(values, n, sigma)
+    }
+
     /// The affinities of a symmetric n×n matrix of squared distances, row by row. O(n²).
     ///
     /// # Errors
@@ -121,7 +170,11 @@ impl Affinity {
         check_square(squared, n)?;
         let sigma = kernel_width(squared, n, kernel, width, progress)?;
         let scale = 0.5 / sigma;
-        Ok(Self { n, values: squared.iter().map(|d| kernel.affinity(d * scale)).collect(), sigma })
+        let mut values = vec![0.0; squared.len()];
+        values.par_chunks_mut(n.max(1)).zip(squared.par_chunks(n.max(1))).for_each(|(values, squared)| {
+            values.iter_mut().zip(squared).for_each(|(p, d)| *p = kernel.affinity(d * scale));
+        });
+        Ok(Self { n, values, sigma })
     }
 
     /// Replaces affinities below `least` by 0 (the truncated kernel of the paper, section 3).
@@ -271,17 +324,13 @@ pub(super) fn log_odds(p: f64) -> f64 {
     (p / (1.0 - p)).ln()
 }
 
-/// Squared distances, up to the factor σ, whose affinities under `kernel` are `p`: the inverse of
-/// [`Kernel::affinity`]. Negative under the logistic kernel where p > ½, which classical scaling allows.
+/// Squared distances, up to the factor σ, whose affinities under `kernel` are those given.
 pub(super) fn squared_distances(affinity: &Affinity, kernel: Kernel) -> Vec<f64> {
     let n = affinity.len();
     let mut squared = vec![0.0; n * n];
     for i in 0..n {
         for (j, &p) in affinity.row(i).iter().enumerate().filter(|(j, _)| *j != i) {
-            squared[i * n + j] = match kernel {
-                Kernel::Gaussian => -2.0 * p.max(1e-12).ln(),
-                Kernel::Logistic => -2.0 * log_odds(p),
-            };
+            squared[i * n + j] = 2.0 * kernel.scaled_square(p);
         }
     }
     squared
@@ -307,6 +356,12 @@ mod tests {
             assert!((Kernel::Gaussian.affinity(u) / (-u).exp() - 1.0).abs() < 1e-14);
             assert!((Kernel::Logistic.affinity(u) * (1.0 + u.exp()) - 1.0).abs() < 1e-14);
         }
+        for (kernel, u) in
+            [Kernel::Gaussian, Kernel::Logistic].into_iter().flat_map(|k| [0.1, 1.0, 20.0].map(|u| (k, u)))
+        {
+            assert!((kernel.log_odds(u) - log_odds(kernel.affinity(u))).abs() < 1e-9);
+        }
+        assert!(Kernel::Gaussian.log_odds(0.0).is_finite() && (Kernel::Gaussian.log_odds(1e4) + 1e4).abs() < 1e-9);
         assert_eq!(Kernel::Gaussian.affinity(0.0), Kernel::Gaussian.at_zero());
         assert_eq!(Kernel::Logistic.affinity(0.0), Kernel::Logistic.at_zero());
     }

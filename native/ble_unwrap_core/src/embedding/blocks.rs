@@ -204,7 +204,7 @@ impl Blocks for General {
 
 /// Solves the ridged m×m system given by its lower triangle, in place by Cholesky; zero where it is singular
 /// or not finite.
-fn solve(matrix: &mut [f64], m: usize, right: &[f64], solution: &mut [f64]) {
+pub(super) fn solve(matrix: &mut [f64], m: usize, right: &[f64], solution: &mut [f64]) {
     let ridge = RIDGE * (0..m).map(|r| matrix[r * m + r]).sum::<f64>();
     solution.copy_from_slice(right);
     for r in 0..m {

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::Progress;
 use crate::geodesics::LandmarkDistances;
-use crate::linalg::{Mds, classical_mds};
+use crate::linalg::{EigenError, Mds, leading_mds};
 use crate::mesh::VertexId;
 
 use super::affinity::{Affinity, KernelWidth, kernel_width};
@@ -19,6 +19,8 @@ use super::settings::{EmbeddingSettings, Initial, Model};
 /// Least extent along the second principal axis over the first: distances are kept to 6e-8, and the second
 /// eigenvalue, its square, drowns in their rounding below about 1e-8.
 const LEAST_ASPECT: f64 = 1e-4;
+/// Residual of the two eigenpairs over the larger eigenvalue: below the rounding of the distances.
+const SCALING_TOLERANCE: f64 = 1e-9;
 /// Deviation of each coordinate of a random start, in units of √σ. At 1e-4 the first steps
 /// explode, since the bound is nearly singular; at ½ no start tried did.
 const RANDOM_DEVIATION: f64 = 0.5;
@@ -39,6 +41,8 @@ pub struct ChartEmbedding {
     pub converged: bool,
     /// Log-likelihood (4) of the landmarks; `None` for Isomap.
     pub log_likelihood: Option<f64>,
+    /// That at the start and after each sweep; empty for Isomap.
+    pub trace: Vec<f64>,
 }
 
 /// Embeds a chart in the plane by the geodesic distances of its landmarks.
@@ -70,7 +74,7 @@ pub fn embed_chart(
     squared.iter_mut().for_each(|d| *d *= *d);
 
     let mds = match (settings.model, settings.initial) {
-        (Model::Isomap, _) | (_, Initial::Mds) => Some(planar_mds(&squared, k)?),
+        (Model::Isomap, _) | (_, Initial::Mds) => Some(planar_mds(&squared, k, progress)?),
         (_, Initial::Random) => None,
     };
     progress.check()?;
@@ -78,7 +82,8 @@ pub fn embed_chart(
         let uv = isomap::place_all(mds, distances, progress)?;
         let uv = with_landmarks(uv, distances, |l| Point2::new(mds.point(l)[0], mds.point(l)[1]));
         let sigma = mean_squared;
-        return Ok(ChartEmbedding { uv, landmarks: k, sigma, sweeps: 0, converged: true, log_likelihood: None });
+        let (log_likelihood, trace) = (None, Vec::new());
+        return Ok(ChartEmbedding { uv, landmarks: k, sigma, sweeps: 0, converged: true, log_likelihood, trace });
     }
 
     let kernel = settings.kernel();
@@ -98,9 +103,9 @@ pub fn embed_chart(
     let placed = if every_vertex_is_a_landmark(distances) {
         vec![Point2::origin(); distances.vertex_count()]
     } else {
-        let model = LandmarkModel::new(&fit.coordinates, &fit.intercepts, kernel, sigma);
+        let model = LandmarkModel::new(2, &fit.coordinates, &fit.intercepts, kernel, sigma);
         let parameters = model.place_all(distances, progress)?;
-        parameters.into_iter().map(|[x, y, _]| Point2::new(unit * x, unit * y)).collect()
+        parameters.chunks_exact(3).map(|theta| Point2::new(unit * theta[0], unit * theta[1])).collect()
     };
     let at = |l: usize| Point2::new(unit * fit.coordinates[2 * l], unit * fit.coordinates[2 * l + 1]);
     Ok(ChartEmbedding {
@@ -110,6 +115,7 @@ pub fn embed_chart(
         sweeps: fit.sweeps,
         converged: fit.converged,
         log_likelihood: Some(fit.log_likelihood),
+        trace: fit.trace,
     })
 }
 
@@ -132,8 +138,11 @@ fn mean_squared_distance(distances: &LandmarkDistances) -> Result<f64, Embedding
 }
 
 /// Classical scaling of the landmarks, which must span a plane.
-fn planar_mds(squared: &[f64], k: usize) -> Result<Mds, EmbeddingError> {
-    let mds = classical_mds(squared, k, 2)?;
+fn planar_mds(squared: &[f64], k: usize, progress: &Progress) -> Result<Mds, EmbeddingError> {
+    let mds = leading_mds(squared, k, 2, SCALING_TOLERANCE, progress).map_err(|error| match error {
+        EigenError::Cancelled(cancelled) => EmbeddingError::Cancelled(cancelled),
+        other => EmbeddingError::Eigen(other),
+    })?;
     let [first, second] = [mds.eigenvalues[0], mds.eigenvalues[1].max(0.0)];
     if first.is_nan() || first <= 0.0 {
         return Err(EmbeddingError::NoExtent);

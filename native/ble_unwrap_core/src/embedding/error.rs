@@ -61,7 +61,10 @@ pub enum EmbeddingError {
         component: usize,
     },
     /// A distance is negative, infinite or not a number, or too large to square.
-    #[error("the distance from point {row} to point {column} is {value}; it must be finite and not negative")]
+    #[error(
+        "the distance from point {row} to point {column} is {value}; it must be finite and not negative{}",
+        hint(*.value)
+    )]
     DistanceOutOfRange {
         /// First point.
         row: usize,
@@ -80,6 +83,33 @@ pub enum EmbeddingError {
         /// The affinity.
         value: f64,
     },
+    /// Coordinates or distances whose squares are lost to rounding, or nearly.
+    #[error("the largest {what} is {largest:.1e}; scale the data so that it lies between 1e-30 and 1e30")]
+    OutOfScale {
+        /// What was measured.
+        what: &'static str,
+        /// Its largest size.
+        largest: f64,
+    },
+    /// Points that coincide are no more landmarks than one.
+    #[error("the points lie in {places} distinct places only, which do not span {dimensions} dimensions")]
+    TooFewPlaces {
+        /// Number of places.
+        places: usize,
+        /// Number of dimensions asked for.
+        dimensions: usize,
+    },
+    /// A coordinate of the start is infinite or not a number.
+    #[error("component {component} of point {point} of the start is not finite")]
+    StartNotFinite {
+        /// Number of the point.
+        point: usize,
+        /// Number of the component.
+        component: usize,
+    },
+    /// No sweep leaves the start 0.
+    #[error("the start is 0 for all points, a saddle that no sweep leaves; start from classical scaling or at random")]
+    StartAtSaddle,
     /// There must be more points than dimensions.
     #[error("{points} points do not span {dimensions} dimensions")]
     TooFewPoints {
@@ -88,13 +118,63 @@ pub enum EmbeddingError {
         /// Number of dimensions asked for.
         dimensions: usize,
     },
-    /// Isomap fits no likelihood; classical scaling is [`classical_mds`](crate::linalg::classical_mds).
-    #[error("Isomap fits no likelihood; use classical scaling")]
-    NoLikelihood,
+    /// The graph of nearest neighbours falls into pieces, between which there is no distance.
+    #[error(
+        "the graph of {neighbours} nearest neighbours falls into {pieces} pieces, the largest of {largest} of the \
+         {points} points; {}, or embed each piece by itself",
+        raise(*.enough)
+    )]
+    Disconnected {
+        /// Number of neighbours that points are joined to.
+        neighbours: usize,
+        /// Number of connected pieces.
+        pieces: usize,
+        /// Number of points.
+        points: usize,
+        /// Number of points in the largest piece.
+        largest: usize,
+        /// The least number of neighbours that connects them, where one was found.
+        enough: Option<usize>,
+    },
+    /// The matrix of all pairs does not fit in memory.
+    #[error("the {points} x {points} matrix of all pairs does not fit in memory; embed by landmarks (100 or so)")]
+    TooManyPoints {
+        /// Number of points.
+        points: usize,
+    },
+    /// New points do not have as many numbers as the fitted ones ask for.
+    #[error("expected {expected} {what}, found {found}")]
+    WrongColumns {
+        /// Number needed.
+        expected: usize,
+        /// What they are.
+        what: &'static str,
+        /// Number given.
+        found: usize,
+    },
     /// The eigenvalues of the double-centred distances could not be had.
     #[error(transparent)]
-    Eigen(#[from] EigenError),
+    Eigen(EigenError),
     /// Asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl From<EigenError> for EmbeddingError {
+    fn from(error: EigenError) -> Self {
+        match error {
+            EigenError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            EigenError::NotFinite { .. } | EigenError::NoConvergence => Self::Eigen(error),
+        }
+    }
+}
+
+/// What to do about an infinite distance.
+fn hint(distance: f64) -> &'static str {
+    if distance == f64::INFINITY { "; pieces with no path between them are embedded each by itself" } else { "" }
+}
+
+/// How many neighbours to ask for.
+fn raise(enough: Option<usize>) -> String {
+    enough.map_or_else(|| "raise neighbours".into(), |k| format!("raise neighbours to {k}"))
 }

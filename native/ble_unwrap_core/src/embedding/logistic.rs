@@ -8,6 +8,8 @@
 //! w(t) = (q−½)/t, is ¼ at t = 0 and falls off, so steps are longer; the quadratic through the
 //! present point with curvature −w still lies below the log-likelihood everywhere.
 
+use std::marker::PhantomData;
+
 /// Log-odds beyond ±700 have an affinity of 0 or 1 to 300 digits, and e⁻⁷⁰⁰ is still a normal number.
 const LARGEST_LOG_ODDS: f64 = 700.0;
 
@@ -119,8 +121,31 @@ const LANES: usize = 4;
 
 /// The sums of the point `theta = (x, y, a)` against `others`, whose affinities to it are `p`.
 ///
-/// One exponential a pair: log(1+e⁻ˢ) is summed as the logarithm of a product of 64. O(n), no allocation.
+/// One exponential a pair: log(1+e⁻ˢ) is summed as the logarithm of a product of 64. O(n), no allocation. Compiled for
+/// the widest registers there are; the bytes are the same for all, since the lanes are fixed and nothing is fused.
 pub(super) fn planar_row<C: Curvature>(p: &[f64], others: PlanarPoints<'_>, theta: [f64; 3]) -> RowSums {
+    pulp::Arch::new().dispatch(Row { p, others, theta, curvature: PhantomData::<C> })
+}
+
+/// The work of [`planar_row`], compiled once for each width of registers.
+struct Row<'a, C> {
+    p: &'a [f64],
+    others: PlanarPoints<'a>,
+    theta: [f64; 3],
+    curvature: PhantomData<C>,
+}
+
+impl<C: Curvature> pulp::WithSimd for Row<'_, C> {
+    type Output = RowSums;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> RowSums {
+        row_sums::<C>(self.p, self.others, self.theta)
+    }
+}
+
+#[inline(always)]
+fn row_sums<C: Curvature>(p: &[f64], others: PlanarPoints<'_>, theta: [f64; 3]) -> RowSums {
     let mut sums = RowSums::default();
     let [x0, y0, a0] = theta;
     let blocks = p.chunks(BLOCK).zip(others.x.chunks(BLOCK)).zip(others.y.chunks(BLOCK)).zip(others.a.chunks(BLOCK));

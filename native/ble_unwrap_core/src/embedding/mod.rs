@@ -15,7 +15,7 @@
 //! The result may have flips (few with the default model, many with the printed one); removing
 //! them is the next stage's.
 //!
-//! The same method for points, distances or affinities of any kind in any dimension: [`embed`].
+//! The same method for points, distances or affinities of any kind in any dimension: [`embed()`].
 //!
 //! # References
 //! Bernoulli embedding model and its application in texture mapping, 2006 ("the paper"), sections
@@ -26,25 +26,37 @@ mod affinity;
 mod bernoulli_logistic;
 mod blocks;
 mod chart;
+mod embed;
 mod error;
 mod gauge;
+mod input;
 mod isomap;
 mod landmark_regression;
 mod logistic;
-mod point_set;
+mod placement;
 mod random;
 mod settings;
+mod source;
+mod truncated;
 mod unfold;
 
 pub use affinity::{Affinity, Kernel, KernelWidth, kernel_width, model_affinity};
 pub use bernoulli_logistic::{Fit, FitOptions, LogitModel, Update, fit};
 pub use chart::{ChartEmbedding, embed_chart};
+pub use embed::{EmbedOptions, Embedding, embed};
 pub use error::EmbeddingError;
 pub use gauge::fix_gauge;
-pub use landmark_regression::LandmarkModel;
-pub use point_set::{EmbedInput, embed};
+pub use input::{EmbedInput, PointMetric};
+pub use landmark_regression::{Evidence, LandmarkModel};
+pub use placement::{FittedLandmarks, place};
 pub use settings::{EmbeddingSettings, Initial, Model};
 pub use unfold::{plane, unfold};
 
 #[cfg(test)]
+mod embed_tests;
+#[cfg(test)]
 mod flat_shapes;
+#[cfg(test)]
+mod landmark_tests;
+#[cfg(test)]
+mod misprints;

@@ -23,6 +23,15 @@ pub enum Model {
     Isomap,
 }
 
+impl Model {
+    pub(super) fn kernel(self) -> Kernel {
+        match self {
+            Self::Default | Self::Isomap => Kernel::Logistic,
+            Self::Paper => Kernel::Gaussian,
+        }
+    }
+}
+
 /// Where the fit starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Initial {
@@ -81,10 +90,7 @@ impl EmbeddingSettings {
     }
 
     pub(super) fn kernel(&self) -> Kernel {
-        match self.model {
-            Model::Default | Model::Isomap => Kernel::Logistic,
-            Model::Paper => Kernel::Gaussian,
-        }
+        self.model.kernel()
     }
 
     pub(super) fn width(&self) -> KernelWidth {

@@ -144,7 +144,8 @@ impl<'m> FastMarching<'m> {
     /// with one source of offset 0, at least the distance through space, and exact to rounding where the
     /// mesh is intrinsically flat and the straight path meets no boundary. Not guaranteed: symmetry or
     /// the triangle inequality beyond the discretisation error, which is of first order in the edge
-    /// length on curved surfaces. O(n log n); about 0.4 µs a vertex.
+    /// length on curved surfaces: 0.1 to 0.4 % on average and up to 3 % at single vertices of meshes of some
+    /// thousand (see the table of this module). O(n log n); about 0.4 µs a vertex.
     ///
     /// # Errors
     /// [`Cancelled`] if `progress` says so.

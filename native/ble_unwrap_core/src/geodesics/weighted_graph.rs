@@ -14,30 +14,42 @@ pub struct WeightedGraph {
 impl WeightedGraph {
     /// A graph of `n` nodes from edges (u, v, length), each given once and stored both ways. Of
     /// several edges between the same nodes the shortest is kept. Left out: loops, edges to nodes that
-    /// are not there, lengths that are negative or no number. O(n + m log m).
+    /// are not there, lengths that are negative or no number. O(n + m log d), where d is the most edges of a node.
     #[must_use]
     pub fn from_edges(n: usize, edges: impl IntoIterator<Item = (usize, usize, f64)>) -> Self {
-        let mut arcs = Vec::new();
-        for (u, v, length) in edges {
-            if u < n && v < n && u != v && length >= 0.0 {
-                arcs.push((u, v, length));
-                arcs.push((v, u, length));
-            }
-        }
-        arcs.sort_unstable_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)));
-        arcs.dedup_by_key(|a| (a.0, a.1));
+        let mut edges: Vec<(u32, u32, f64)> = edges
+            .into_iter()
+            .filter(|&(u, v, length)| u < n && v < n && u != v && length >= 0.0)
+            .map(|(u, v, length)| (u as u32, v as u32, length))
+            .collect();
         let mut offsets = vec![0; n + 1];
-        for &(u, _, _) in &arcs {
-            offsets[u + 1] += 1;
+        for &(u, v, _) in &edges {
+            offsets[u as usize + 1] += 1;
+            offsets[v as usize + 1] += 1;
         }
         for u in 0..n {
             offsets[u + 1] += offsets[u];
         }
-        Self {
-            offsets,
-            targets: arcs.iter().map(|a| a.1 as u32).collect(),
-            lengths: arcs.iter().map(|a| a.2).collect(),
+        let mut next = offsets.clone();
+        let mut arcs = vec![(0u32, 0.0f64); offsets[n]];
+        for (u, v, length) in edges.drain(..) {
+            for (from, to) in [(u, v), (v, u)] {
+                arcs[next[from as usize]] = (to, length);
+                next[from as usize] += 1;
+            }
         }
+        let (mut targets, mut lengths) = (Vec::with_capacity(arcs.len()), Vec::with_capacity(arcs.len()));
+        for u in 0..n {
+            let row = &mut arcs[offsets[u]..offsets[u + 1]];
+            row.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+            offsets[u] = targets.len();
+            for same in row.chunk_by(|a, b| a.0 == b.0) {
+                targets.push(same[0].0);
+                lengths.push(same[0].1);
+            }
+        }
+        offsets[n] = targets.len();
+        Self { offsets, targets, lengths }
     }
 
     /// The vertices and edges of a mesh.
@@ -45,6 +57,15 @@ impl WeightedGraph {
     pub fn of_mesh(mesh: &TriMesh) -> Self {
         let edges = mesh.edges().map(|h| (mesh.from(h).index(), mesh.to(h).index(), mesh.edge_length(h)));
         Self::from_edges(mesh.vertex_count(), edges)
+    }
+
+    /// The graph with more edges, such as the bridges of [`shortest_bridges`](super::shortest_bridges()); which of
+    /// them are taken says [`WeightedGraph::from_edges`].
+    #[must_use]
+    pub fn with_edges(&self, edges: &[(usize, usize, f64)]) -> Self {
+        let n = self.node_count();
+        let present = (0..n).flat_map(|u| self.neighbours(u).filter(move |&(v, _)| u < v).map(move |(v, l)| (u, v, l)));
+        Self::from_edges(n, present.chain(edges.iter().copied()))
     }
 
     /// Number of nodes.
@@ -67,7 +88,8 @@ impl WeightedGraph {
     }
 
     /// A component label for each node and the number of components; labels ascend with the lowest
-    /// node. A graph that measures distances must have one.
+    /// node. Distances between components are infinite; [`connectivity()`](super::connectivity()) tells how to mend the
+    /// graph of a point cloud.
     #[must_use]
     pub fn components(&self) -> (Vec<u32>, usize) {
         let mut label = vec![u32::MAX; self.node_count()];

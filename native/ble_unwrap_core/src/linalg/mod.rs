@@ -4,11 +4,12 @@
 //! row.
 
 mod classical_mds;
+mod krylov;
 mod sparse;
 mod symmetric;
 mod vector_state;
 
-pub use classical_mds::{Mds, classical_mds};
+pub use classical_mds::{Mds, classical_mds, leading_mds};
 pub use sparse::{SparseCholesky, SparseError, SparsePattern};
 pub use symmetric::{EigenError, Eigenpairs, leading_eigenpairs};
 pub use vector_state::restore_vector_state;

@@ -6,6 +6,7 @@ use faer::{Mat, MatRef, Par};
 use thiserror::Error;
 
 use super::vector_state::restore_vector_state;
+use crate::progress::Cancelled;
 
 /// Why a symmetric matrix has no eigenpairs to give.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
@@ -21,6 +22,9 @@ pub enum EigenError {
     /// The QR iteration gave up; does not happen for matrices of sane scale.
     #[error("the symmetric eigenvalue iteration did not converge")]
     NoConvergence,
+    /// Asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 /// The eigenvalues of a symmetric matrix and the eigenvectors of the largest.

@@ -5,6 +5,7 @@
 mod coarsen;
 mod condition;
 mod defects;
+mod disjoint_sets;
 mod ear_clipping;
 mod glue;
 mod groups;
@@ -21,6 +22,7 @@ mod weld;
 pub use coarsen::{Coarse, coarsen};
 pub use condition::{ConditionOptions, Surface, condition};
 pub use defects::{Defect, Defects};
+pub(crate) use disjoint_sets::DisjointSets;
 pub use groups::Groups;
 pub use index::{FaceId, HalfedgeId, VertexId};
 pub use input::{MeshError, MeshInput};

@@ -1,5 +1,6 @@
 //! One winding for each component, and cuts where a surface has only one side.
 
+use super::disjoint_sets::DisjointSets;
 use super::glue::Link;
 
 /// Which polygons to turn over, and the links that no choice of windings can satisfy.
@@ -99,47 +100,6 @@ fn two_colour(node_count: usize, disputes: &[[u32; 2]]) -> (Vec<bool>, Vec<u32>,
         count += 1;
     }
     (parity, component, count as usize)
-}
-
-/// Union-find; the representative of a set is its lowest element.
-struct DisjointSets {
-    parent: Vec<u32>,
-}
-
-impl DisjointSets {
-    fn new(count: usize) -> Self {
-        Self { parent: (0..count as u32).collect() }
-    }
-
-    fn root(&mut self, mut i: usize) -> usize {
-        while self.parent[i] as usize != i {
-            let grandparent = self.parent[self.parent[i] as usize];
-            self.parent[i] = grandparent;
-            i = grandparent as usize;
-        }
-        i
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parent[a.max(b)] = a.min(b) as u32;
-    }
-
-    /// A number for each element's set, ascending with the lowest element, and how many there are.
-    fn labels(mut self) -> (Vec<u32>, usize) {
-        let mut label = vec![u32::MAX; self.parent.len()];
-        let mut count = 0;
-        for i in 0..label.len() {
-            let root = self.root(i);
-            if root == i {
-                label[i] = count;
-                count += 1;
-            } else {
-                label[i] = label[root];
-            }
-        }
-        (label, count as usize)
-    }
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ mod flatten;
 mod merge;
 mod prolong;
 mod rungs;
+mod steps;
 mod tally;
 
 use std::time::Instant;
@@ -26,6 +27,7 @@ use crate::report::Report;
 use crate::settings::Settings;
 
 pub use rungs::{Rung, Rungs};
+pub(crate) use steps::Steps;
 use tally::Tally;
 
 /// A UV for every corner of the input, and what is known about it.
@@ -78,19 +80,22 @@ pub fn unwrap(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -
 }
 
 /// Seconds of each stage, for the report; nothing is decided by them.
-struct Clock {
+pub(crate) struct Clock {
     last: Instant,
     laps: Vec<(&'static str, f64)>,
 }
 
 impl Clock {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { last: Instant::now(), laps: Vec::new() }
     }
 
-    fn lap(&mut self, name: &'static str) {
+    pub(crate) fn lap(&mut self, name: &'static str) {
         let now = Instant::now();
         self.laps.push((name, (now - self.last).as_secs_f64()));
         self.last = now;
+    }
+    pub(crate) fn into_laps(self) -> Vec<(&'static str, f64)> {
+        self.laps
     }
 }

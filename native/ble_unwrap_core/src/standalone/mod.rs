@@ -3,9 +3,13 @@
 //! Everything is numbered as in the input, whatever conditioning does to it on the way.
 
 mod distances;
+mod flatten;
+mod graph;
 mod layout;
 mod repack;
 
 pub use distances::{DistancesError, surface_distances};
+pub use flatten::{FlattenError, FlattenReport, Flattening, MapQuality, flatten};
+pub use graph::{CloudDistanceSettings, CloudDistancesError, Connect, cloud_distances};
 pub use layout::{LayoutError, LayoutMeasures, measure_layout};
 pub use repack::{RepackError, Repacked, repack};

@@ -56,29 +56,62 @@ pub fn l2_stretch(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> 
 /// If there is not one point a vertex.
 #[must_use]
 pub fn l2_of_positions(mesh: &TriMesh, uv: &[Point2<f64>], negligible: f64) -> f64 {
-    assert_eq!(uv.len(), mesh.vertex_count(), "a point a vertex");
-    let (mut energy, mut surface, mut plane) = (0.0, 0.0, 0.0);
-    for f in mesh.faces() {
-        let [p, q, r] = mesh.triangle_positions(f);
-        let (e1, e2) = (q - p, r - p);
-        let double_area = e1.cross(&e2).norm();
-        let longest = e1.norm().max(e2.norm()).max((r - q).norm());
-        if double_area <= negligible * longest || double_area.is_nan() {
-            continue;
+    let sums = Sums::of_positions(mesh, uv, negligible);
+    (sums.energy * sums.plane).sqrt() / sums.surface
+}
+
+/// L2 stretch as [`l2_of_positions`], but of a map that may have flips: singular values do not tell a face from
+/// its mirror image, so each face counts as if it were the right way up, with a positive area in the plane.
+///
+/// At least 1, and the same as [`l2_of_positions`] without flips. Infinite where a face that counts has no area in the
+/// plane; large where folds leave thin ones. O(n).
+///
+/// # Panics
+/// If there is not one point a vertex.
+#[must_use]
+pub fn l2_unsigned(mesh: &TriMesh, uv: &[Point2<f64>], negligible: f64) -> f64 {
+    let sums = Sums::of_positions(mesh, uv, negligible);
+    let l2 = (sums.energy * sums.plane_unsigned).sqrt() / sums.surface;
+    // A face whose first edge has no length divides nothing by nothing.
+    if l2.is_nan() && sums.surface > 0.0 { f64::INFINITY } else { l2 }
+}
+
+/// What L2 stretch is made of.
+#[derive(Default)]
+struct Sums {
+    energy: f64,
+    surface: f64,
+    plane: f64,
+    plane_unsigned: f64,
+}
+
+impl Sums {
+    fn of_positions(mesh: &TriMesh, uv: &[Point2<f64>], negligible: f64) -> Self {
+        assert_eq!(uv.len(), mesh.vertex_count(), "a point a vertex");
+        let mut sums = Self::default();
+        for f in mesh.faces() {
+            let [p, q, r] = mesh.triangle_positions(f);
+            let (e1, e2) = (q - p, r - p);
+            let double_area = e1.cross(&e2).norm();
+            let longest = e1.norm().max(e2.norm()).max((r - q).norm());
+            if double_area <= negligible * longest || double_area.is_nan() {
+                continue;
+            }
+            let [a, b, c] = mesh.triangle(f).map(|v| uv[v.index()]);
+            let (d1, d2) = (b - a, c - a);
+            let determinant = d1.perp(&d2);
+            // The map from the plane to the surface, both with their first edge as axis: triangular, so
+            // that a needle's height is not lost among its lengths.
+            let (x, u) = (e1.norm(), d1.norm());
+            let shear = (e1.dot(&e2) / x - x / u * (d1.dot(&d2) / u)) / (determinant / u);
+            let squared_norm = (x / u).powi(2) + shear.powi(2) + (double_area / x / (determinant / u)).powi(2);
+            sums.energy += 0.25 * double_area * squared_norm;
+            sums.surface += 0.5 * double_area;
+            sums.plane += 0.5 * determinant;
+            sums.plane_unsigned += 0.5 * determinant.abs();
         }
-        let [a, b, c] = mesh.triangle(f).map(|v| uv[v.index()]);
-        let (d1, d2) = (b - a, c - a);
-        let determinant = d1.perp(&d2);
-        // The map from the plane to the surface, both with their first edge as axis: triangular, so
-        // that a needle's height is not lost among its lengths.
-        let (x, u) = (e1.norm(), d1.norm());
-        let shear = (e1.dot(&e2) / x - x / u * (d1.dot(&d2) / u)) / (determinant / u);
-        let squared_norm = (x / u).powi(2) + shear.powi(2) + (double_area / x / (determinant / u)).powi(2);
-        energy += 0.25 * double_area * squared_norm;
-        surface += 0.5 * double_area;
-        plane += 0.5 * determinant;
+        sums
     }
-    (energy * plane).sqrt() / surface
 }
 
 /// L-infinity stretch of a chart scaled to equal area: the greatest 1/σ₂ of its faces times √(ΣA₂/ΣA₃). At
@@ -145,7 +178,19 @@ mod tests {
         }
         let uv: Vec<_> = mesh.positions().iter().map(|p| Point2::new(2.0 * p.x + 0.3 * p.y, 0.5 * p.y)).collect();
         assert!((l2_of_positions(&mesh, &uv, 1e-8) - l2_stretch(&mesh, &rest, &uv)).abs() < 1e-12);
+        assert_eq!(l2_unsigned(&mesh, &uv, 1e-8), l2_of_positions(&mesh, &uv, 1e-8));
         let uv = vec![Point2::origin(); mesh.vertex_count()];
         assert!(!l2_stretch(&mesh, &rest, &uv).is_finite());
+        assert_eq!(l2_unsigned(&mesh, &uv, 1e-8), f64::INFINITY);
+    }
+
+    #[test]
+    fn folds_count_as_their_mirror_image_and_collapses_as_infinite() {
+        let mesh = grid(4, 1, |x, y| Point3::new(x, y, 0.0));
+        let folded: Vec<_> = mesh.positions().iter().map(|p| Point2::new((p.x - 2.0).abs(), p.y)).collect();
+        assert!((l2_unsigned(&mesh, &folded, 1e-8) - 1.0).abs() < 1e-12, "two isometric halves, one over the other");
+        assert!(!l2_of_positions(&mesh, &folded, 1e-8).is_normal(), "their signed areas cancel");
+        let flat: Vec<_> = mesh.positions().iter().map(|p| Point2::new(p.x.min(3.0), p.y)).collect();
+        assert_eq!(l2_unsigned(&mesh, &flat, 1e-8), f64::INFINITY);
     }
 }

@@ -36,7 +36,9 @@ use thiserror::Error;
 
 pub use barrier::BOUNDARY_REACH;
 pub use injective::{Injective, make_injective};
-pub use measure::{l2_of_positions, l2_stretch, linf_stretch, plane_area, rescale_to_equal_area, surface_area};
+pub use measure::{
+    l2_of_positions, l2_stretch, l2_unsigned, linf_stretch, plane_area, rescale_to_equal_area, surface_area,
+};
 pub use overlap::{BoundaryDefect, boundary_defect, boundary_is_simple, first_flip};
 pub use tutte::{TutteBoundary, tutte_embedding};
 

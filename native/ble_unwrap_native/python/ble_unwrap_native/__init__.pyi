@@ -11,19 +11,26 @@ __all__ = [
     "BleUnwrapError",
     "Cancelled",
     "Embedding",
+    "Flattening",
     "InternalError",
     "InvalidArgumentError",
     "InvalidMeshError",
     "Job",
     "PackedCharts",
+    "PointAtlas",
     "__version__",
     "default_settings",
     "embed",
+    "flatten",
     "geodesic_distances",
+    "graph_distances",
     "measure",
     "pack",
+    "place",
     "submit_unwrap",
+    "submit_unwrap_points",
     "unwrap",
+    "unwrap_points",
 ]
 
 __version__: str
@@ -36,15 +43,19 @@ class InternalError(BleUnwrapError): ...
 
 @type_check_only
 class _Threads(TypedDict, total=False):
-    preset: Literal["default", "paper"]
+    preset: Literal["default", "paper", "iso_charts"]
     threads: int
+
+@type_check_only
+class _PlaceSettings(_Threads, total=False):
+    model: Literal["default", "paper", "isomap"]
 
 @type_check_only
 class _GeodesicSettings(_Threads, total=False):
     geodesics: Literal["fast_marching", "dijkstra"]
 
 @type_check_only
-class _EmbeddingSettings(_Threads, total=False):
+class _FitSettings(_Threads, total=False):
     seed: int
     model: Literal["default", "paper", "isomap"]
     kernel_width: float | None
@@ -52,6 +63,9 @@ class _EmbeddingSettings(_Threads, total=False):
     max_sweeps: int
     tolerance: float
     update: Literal["serial", "parallel"]
+
+@type_check_only
+class _EmbeddingSettings(_FitSettings, total=False):
     initial: Literal["mds", "random"]
 
 @type_check_only
@@ -64,18 +78,30 @@ class _PackSettings(_MeasureSettings, total=False):
     rotation: Literal["any", "quarter", "none"]
 
 @type_check_only
-class _Settings(_GeodesicSettings, _EmbeddingSettings, _PackSettings, total=False):
+class _CloudSettings(_EmbeddingSettings, _PackSettings, total=False):
     stretch_limit: float
+    coarse: bool
+    landmark_fraction: float
+    landmark_min: int
+    landmark_max: int | None
+
+@type_check_only
+class _FlattenSettings(_GeodesicSettings, _EmbeddingSettings, total=False):
     weld: bool
+    landmark_fraction: float
+    landmark_min: int
+    landmark_max: int | None
+    together_max: int
+    stretch_solver: Literal["newton", "line_search"]
+    stretch_iterations: int
+
+@type_check_only
+class _Settings(_FlattenSettings, _PackSettings, total=False):
+    stretch_limit: float
     coarse: bool
     merge: bool
     holes: Literal["keep", "cut"]
     chart_scale: Literal["uniform", "stretch"]
-    landmark_fraction: float
-    landmark_min: int
-    landmark_max: int | None
-    stretch_solver: Literal["newton", "line_search"]
-    stretch_iterations: int
 
 @final
 class Array(Buffer):
@@ -104,11 +130,30 @@ class Embedding:
     def intercepts(self) -> Array: ...
     @property
     def report(self) -> dict[str, Any]: ...
+    def transform(self, data: Buffer, *, job: Job | None = None, **settings: Unpack[_Threads]) -> Array: ...
+
+@final
+class Flattening:
+    @property
+    def embedded(self) -> Array: ...
+    @property
+    def uv(self) -> Array: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
 
 @final
 class PackedCharts:
     @property
     def uv(self) -> Array: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
+
+@final
+class PointAtlas:
+    @property
+    def uv(self) -> Array: ...
+    @property
+    def chart(self) -> Array: ...
     @property
     def report(self) -> dict[str, Any]: ...
 
@@ -121,7 +166,7 @@ class Job:
     def is_cancelled(self) -> bool: ...
     def is_finished(self) -> bool: ...
     def wait(self, timeout: float | None = None) -> bool: ...
-    # An `Atlas` after `submit_unwrap`, else what the call that was given the job returned.
+    # An `Atlas` after `submit_unwrap`, a `PointAtlas` after `submit_unwrap_points`, else what the call that was given the job returned.
     def result(self) -> Any: ...
 
 def unwrap(
@@ -144,14 +189,45 @@ def submit_unwrap(
     job: Job | None = None,
     **settings: Unpack[_Settings],
 ) -> Job: ...
+def unwrap_points(
+    positions: Buffer,
+    *,
+    neighbours: int = 12,
+    job: Job | None = None,
+    **settings: Unpack[_CloudSettings],
+) -> PointAtlas: ...
+def submit_unwrap_points(
+    positions: Buffer,
+    *,
+    neighbours: int = 12,
+    job: Job | None = None,
+    **settings: Unpack[_CloudSettings],
+) -> Job: ...
 def embed(
     data: Buffer,
     *,
     kind: Literal["points", "distances", "affinities"] = "points",
     dimensions: int = 2,
+    metric: Literal["euclidean", "geodesic"] = "euclidean",
+    neighbours: int = 12,
+    landmarks: int | None = None,
+    initial: Literal["mds", "random"] | Buffer | None = None,
+    mean_affinity: float | None = None,
+    sigma: float | None = None,
+    truncation: float = 0.0,
     job: Job | None = None,
-    **settings: Unpack[_EmbeddingSettings],
+    **settings: Unpack[_FitSettings],
 ) -> Embedding: ...
+def flatten(
+    positions: Buffer,
+    corner_vertices: Buffer,
+    face_offsets: Buffer,
+    *,
+    corner_triangles: Buffer | None = None,
+    minimise: bool = True,
+    job: Job | None = None,
+    **settings: Unpack[_FlattenSettings],
+) -> Flattening: ...
 def geodesic_distances(
     positions: Buffer,
     corner_vertices: Buffer,
@@ -161,6 +237,16 @@ def geodesic_distances(
     corner_triangles: Buffer | None = None,
     job: Job | None = None,
     **settings: Unpack[_GeodesicSettings],
+) -> Array: ...
+def graph_distances(
+    points: Buffer,
+    sources: Buffer | None = None,
+    *,
+    neighbours: int = 12,
+    connect: Literal["error", "bridge", "separate"] = "error",
+    radius: float | None = None,
+    job: Job | None = None,
+    **settings: Unpack[_Threads],
 ) -> Array: ...
 def measure(
     positions: Buffer,
@@ -181,4 +267,16 @@ def pack(
     job: Job | None = None,
     **settings: Unpack[_PackSettings],
 ) -> PackedCharts: ...
-def default_settings(preset: Literal["default", "paper"] = "default") -> dict[str, Any]: ...
+def place(
+    data: Buffer,
+    coordinates: Buffer,
+    intercepts: Buffer | None = None,
+    *,
+    kind: Literal["distances", "affinities"] = "distances",
+    sigma: float = 1.0,
+    truncation: float = 0.0,
+    mean_squared: Buffer | None = None,
+    job: Job | None = None,
+    **settings: Unpack[_PlaceSettings],
+) -> Array: ...
+def default_settings(preset: Literal["default", "paper", "iso_charts"] = "default") -> dict[str, Any]: ...

@@ -1,0 +1,187 @@
+//! The result: a UV a point, a chart a point, and what is known about them.
+
+use std::collections::HashMap;
+
+use thiserror::Error;
+
+/// A UV for every point of a cloud.
+#[derive(Clone, Debug)]
+pub struct PointAtlas {
+    /// One UV a point, in [0, 1]²; (0, 0) for points whose position is not finite.
+    pub uv: Vec<[f32; 2]>,
+    /// Chart of each point, from 0; −1 for points whose position is not finite.
+    pub chart: Vec<i32>,
+    /// Measures of the result.
+    pub report: CloudReport,
+}
+
+/// Quality and history of an atlas of points. Stretch as in [`crate::distortion`], of the least-squares map of each
+/// point's neighbourhood in its tangent plane; points whose neighbours lie on a line have none.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CloudReport {
+    /// Number of points.
+    pub points: usize,
+    /// Points without UV: those whose position is not finite.
+    pub unmapped_points: usize,
+    /// Points that coincide with an earlier one, whose UV they share.
+    pub duplicate_points: usize,
+    /// Connected pieces of the neighbourhood graph.
+    pub pieces: usize,
+    /// Number of charts.
+    pub charts: usize,
+    /// Charts of less than a texel, enlarged to about one.
+    pub specks: usize,
+    /// L2 stretch of the whole layout, specks aside; 1 is none.
+    pub l2: f64,
+    /// L2 stretch with every chart at its own best scale.
+    pub l2_chart_scale: f64,
+    /// L2 stretch of the worst chart, charts under 1e-4 of the surface aside.
+    pub l2_worst_chart: f64,
+    /// That chart.
+    pub worst_chart: Option<usize>,
+    /// Charts over the stretch limit, with their L2 stretch.
+    pub charts_over_limit: Vec<(usize, f64)>,
+    /// Points whose neighbourhood is turned over against most of their chart.
+    pub folded_points: usize,
+    /// Pairs of points of one chart that lie upon each other but not near each other on the surface.
+    pub overlaps: usize,
+    /// Covered share of the unit square, a square of its neighbours' distance around each point.
+    pub packing_efficiency: f64,
+    /// Points or, in large pieces, cells of points that were charted.
+    pub nodes: usize,
+    /// Landmarks of all charts.
+    pub landmarks: usize,
+    /// Sweeps of all embeddings.
+    pub sweeps: usize,
+    /// How charts came about, and how often.
+    pub rungs: Vec<(&'static str, usize)>,
+    /// Seconds a stage.
+    pub seconds: Vec<(&'static str, f64)>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// A rule that an atlas of points breaks.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+pub enum PointDefect {
+    /// Not one UV and one chart a point.
+    #[error("there are {uvs} UVs and {charts} chart numbers for {points} points")]
+    Count {
+        /// Number of UVs.
+        uvs: usize,
+        /// Number of chart numbers.
+        charts: usize,
+        /// Number of points.
+        points: usize,
+    },
+    /// A point has a chart but no position, or a position but no chart.
+    #[error("point {point} has chart {chart}, which does not fit its position")]
+    Chart {
+        /// The point.
+        point: usize,
+        /// Its chart.
+        chart: i32,
+    },
+    /// A UV outside the unit square.
+    #[error("the UV of point {point} is ({}, {})", uv[0], uv[1])]
+    Outside {
+        /// The point.
+        point: usize,
+        /// Its UV.
+        uv: [f32; 2],
+    },
+    /// Two charts come too near.
+    #[error("points {first} and {second}, of different charts, are {texels} texels apart")]
+    Margin {
+        /// A point.
+        first: usize,
+        /// A point of another chart.
+        second: usize,
+        /// Their distance.
+        texels: f64,
+    },
+}
+
+impl PointAtlas {
+    /// Checks what is promised: every point of finite position has one chart and a UV in [0, 1]², the others have none;
+    /// points of different charts are at least `margin` texels of a texture of this size apart (to 1/1000 texel).
+    /// O(n) where the points are spread.
+    ///
+    /// # Errors
+    /// The first rule found broken.
+    pub fn check_invariants(&self, positions: &[[f64; 3]], size: [u32; 2], margin: f64) -> Result<(), PointDefect> {
+        let points = positions.len();
+        if self.uv.len() != points || self.chart.len() != points {
+            return Err(PointDefect::Count { uvs: self.uv.len(), charts: self.chart.len(), points });
+        }
+        let charts = i32::try_from(self.report.charts).unwrap_or(i32::MAX);
+        for (point, p) in positions.iter().enumerate() {
+            let (chart, uv) = (self.chart[point], self.uv[point]);
+            if p.iter().all(|x| x.is_finite()) != (0..charts).contains(&chart) || chart < -1 {
+                return Err(PointDefect::Chart { point, chart });
+            }
+            if !uv.iter().all(|x| (0.0..=1.0).contains(x)) {
+                return Err(PointDefect::Outside { point, uv });
+            }
+        }
+        self.check_margin(size, margin - 1e-3)
+    }
+
+    fn check_margin(&self, size: [u32; 2], margin: f64) -> Result<(), PointDefect> {
+        if margin <= 0.0 {
+            return Ok(());
+        }
+        let texel = |i: usize| [0, 1].map(|c| f64::from(self.uv[i][c]) * f64::from(size[c]));
+        let key = |i: usize| texel(i).map(|x| (x / margin).floor() as i64);
+        // One list of points for each cell and chart: pairs within a chart are not looked at.
+        let mut cells: HashMap<[i64; 2], Vec<(i32, Vec<u32>)>> = HashMap::new();
+        for i in (0..self.uv.len()).filter(|&i| self.chart[i] >= 0) {
+            let here = cells.entry(key(i)).or_default();
+            match here.iter_mut().find(|(chart, _)| *chart == self.chart[i]) {
+                Some((_, list)) => list.push(i as u32),
+                None => here.push((self.chart[i], vec![i as u32])),
+            }
+        }
+        for i in (0..self.uv.len()).filter(|&i| self.chart[i] >= 0) {
+            let ([x, y], here) = (key(i), texel(i));
+            for cell in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [x + dx, y + dy])) {
+                let others = cells.get(&cell).into_iter().flatten().filter(|(chart, _)| *chart > self.chart[i]);
+                for &j in others.flat_map(|(_, list)| list) {
+                    let there = texel(j as usize);
+                    let texels = (there[0] - here[0]).hypot(there[1] - here[1]);
+                    if texels < margin {
+                        return Err(PointDefect::Margin { first: i, second: j as usize, texels });
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn atlas(uv: &[[f32; 2]], chart: &[i32]) -> PointAtlas {
+        let report = CloudReport { charts: 2, ..CloudReport::default() };
+        PointAtlas { uv: uv.to_vec(), chart: chart.to_vec(), report }
+    }
+
+    #[test]
+    fn broken_rules_are_found() {
+        let positions = [[0.0; 3], [1.0; 3], [f64::NAN; 3]];
+        let check = |uv: [[f32; 2]; 3], chart: &[i32]| atlas(&uv, chart).check_invariants(&positions, [100, 100], 4.0);
+        let good = [[0.1, 0.1], [0.1, 0.15], [0.0, 0.0]];
+        assert_eq!(check(good, &[0, 1, -1]), Ok(()));
+        assert!(matches!(check(good, &[0, 1]), Err(PointDefect::Count { charts: 2, points: 3, .. })));
+        assert_eq!(check(good, &[0, -1, -1]), Err(PointDefect::Chart { point: 1, chart: -1 }));
+        assert_eq!(check(good, &[0, 1, 1]), Err(PointDefect::Chart { point: 2, chart: 1 }));
+        assert_eq!(check(good, &[0, 2, -1]), Err(PointDefect::Chart { point: 1, chart: 2 }));
+        let out = [[0.1, 0.1], [1.1, 0.5], [0.0, 0.0]];
+        assert!(matches!(check(out, &[0, 1, -1]), Err(PointDefect::Outside { point: 1, .. })));
+        let near = [[0.1, 0.1], [0.13, 0.1], [0.0, 0.0]];
+        assert!(matches!(check(near, &[0, 1, -1]), Err(PointDefect::Margin { first: 0, second: 1, .. })));
+        assert_eq!(check(near, &[0, 0, -1]), Ok(()));
+    }
+}

@@ -1,0 +1,63 @@
+//! What can go wrong with a point cloud.
+
+use thiserror::Error;
+
+use crate::error::UnwrapError;
+use crate::packing::PackError;
+use crate::progress::Cancelled;
+
+/// Why there is no atlas of a point cloud. The text names the offending element and the remedy.
+#[derive(Debug, Error)]
+pub enum CloudError {
+    /// A setting is out of its range.
+    #[error(transparent)]
+    Setting(UnwrapError),
+    /// Too few or too many neighbours.
+    #[error("neighbours is {value}; it must be from {} to {}", super::LEAST_NEIGHBOURS, super::MOST_NEIGHBOURS)]
+    Neighbours {
+        /// What was given.
+        value: usize,
+    },
+    /// There are points, but none with finite coordinates.
+    #[error("none of the {points} points has three finite coordinates; repair or replace the positions")]
+    NoFinitePoint {
+        /// Number of points.
+        points: usize,
+    },
+    /// More points than indices of 32 bits tell apart.
+    #[error("{points} points are more than {}; map them in parts", super::MOST_POINTS)]
+    TooLarge {
+        /// Number of points.
+        points: usize,
+    },
+    /// The charts cannot be packed as asked.
+    #[error(transparent)]
+    Pack(PackError),
+    /// The specks alone, each with its margin, need more texels than there are.
+    #[error(
+        "{specks} stray points with a margin of {margin} texels do not fit a texture of {width} by {height}: choose \
+         a smaller margin or a larger texture, or more neighbours so that they join"
+    )]
+    TooManySpecks {
+        /// Number of specks.
+        specks: usize,
+        /// Margin asked for.
+        margin: f64,
+        /// Width of the texture.
+        width: u32,
+        /// Height of the texture.
+        height: u32,
+    },
+    /// The caller asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl From<PackError> for CloudError {
+    fn from(error: PackError) -> Self {
+        match error {
+            PackError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Pack(other),
+        }
+    }
+}

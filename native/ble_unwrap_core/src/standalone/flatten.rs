@@ -1,0 +1,368 @@
+//! One patch to one flat map, step by step: distances, embedding, flips removed, stretch minimised.
+
+use nalgebra::Point2;
+use rayon::prelude::*;
+use robust::{Coord, orient2d};
+use thiserror::Error;
+
+use crate::embedding::{EmbeddingError, Model};
+use crate::error::UnwrapError;
+use crate::geodesics::{self, LandmarkDistances};
+use crate::mesh::{self, ConditionOptions, MeshError, MeshInput, Surface, VertexId};
+use crate::pipeline::{Clock, Steps};
+use crate::progress::{Cancelled, Progress, Stage};
+use crate::settings::{MOST_TOGETHER, Settings};
+use crate::stretch::{self, BOUNDARY_REACH, StretchError};
+
+/// Height, where the surface has area 1, up to which a face's lengths are rounding; such a face does not count.
+const NEGLIGIBLE: f64 = 1e-8;
+
+/// Why a patch cannot be flattened by itself. Numbers count from 0, as the arrays do.
+#[derive(Debug, Error)]
+pub enum FlattenError {
+    /// The input arrays do not make a mesh.
+    #[error(transparent)]
+    Mesh(MeshError),
+    /// A setting is out of its range.
+    #[error(transparent)]
+    Setting(#[from] UnwrapError),
+    /// There is nothing to flatten.
+    #[error("the mesh has no faces")]
+    NoFaces,
+    /// All faces are lines or points.
+    #[error("the surface has no area to speak of: no map of it to the plane means anything; remove it")]
+    NoArea,
+    /// A vertex has no position.
+    #[error("face {face} has a vertex with non-finite coordinates; correct the coordinates or remove the face")]
+    NotFinite {
+        /// The first such face.
+        face: usize,
+    },
+    /// Several surfaces that no edge joins.
+    #[error(
+        "the surface comes in {pieces} pieces, one with face {first} and another with face {second}; flatten them one at a time, or use unwrap"
+    )]
+    Pieces {
+        /// Number of pieces.
+        pieces: usize,
+        /// A face of one.
+        first: usize,
+        /// A face of another.
+        second: usize,
+    },
+    /// A surface that encloses something.
+    #[error("the surface is closed; remove faces to give it a boundary, or use unwrap, which cuts it into charts")]
+    Closed,
+    /// A surface that no plane map can be had of without a cut.
+    #[error("the surface has {genus} handles; cut them open, or use unwrap, which cuts it into charts")]
+    Handles {
+        /// Number of handles.
+        genus: usize,
+    },
+    /// One vertex would need several places in the plane.
+    #[error(
+        "vertex {vertex} holds together parts of the surface that share no edge there, or lies where more than two faces meet at an edge or the surface is one-sided; split it, or use unwrap, which cuts there"
+    )]
+    Pinched {
+        /// The first such vertex.
+        vertex: usize,
+    },
+    /// Two edges join the same vertices.
+    #[error("two edges join vertices {a} and {b}: no map with straight edges can part them; cut there, or use unwrap")]
+    DoubledEdge {
+        /// One end of both.
+        a: usize,
+        /// The other.
+        b: usize,
+    },
+    /// Too many pairs.
+    #[error(
+        "{landmarks} landmarks are more than the {MOST_TOGETHER} whose distances can be handled; lower landmark_fraction or landmark_max"
+    )]
+    TooManyLandmarks {
+        /// As many as the settings ask for.
+        landmarks: usize,
+    },
+    /// The distances have no embedding.
+    #[error(transparent)]
+    Embedding(EmbeddingError),
+    /// Flips could not be removed, or the stretch not minimised.
+    #[error(transparent)]
+    Stretch(StretchError),
+    /// The caller asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl From<MeshError> for FlattenError {
+    fn from(error: MeshError) -> Self {
+        match error {
+            MeshError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Mesh(other),
+        }
+    }
+}
+
+impl From<EmbeddingError> for FlattenError {
+    fn from(error: EmbeddingError) -> Self {
+        match error {
+            EmbeddingError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Embedding(other),
+        }
+    }
+}
+
+/// How good a map is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapQuality {
+    /// Triangles that are turned over or have no area; exact.
+    pub flips: usize,
+    /// L2 stretch at the map's best scale, each flipped triangle counted as its mirror image; infinite where one has no
+    /// area. See [`stretch::l2_unsigned`].
+    pub l2: f64,
+    /// L-infinity stretch, the worst of any triangle in any direction, at the scale of equal area; likewise.
+    pub l_infinity: f64,
+    /// Pearson's correlation of the distances on the surface with those in the plane, over all pairs of a
+    /// landmark and another vertex. NaN where all distances are equal.
+    pub distance_correlation: f64,
+}
+
+/// How a patch was flattened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FlattenReport {
+    /// The model of the embedding.
+    pub model: Model,
+    /// Number of vertices of the surface.
+    pub vertices: usize,
+    /// Number of triangles.
+    pub triangles: usize,
+    /// Number of landmarks; all vertices if they were embedded together.
+    pub landmarks: usize,
+    /// The kernel width σ, in units of squared distance.
+    pub sigma: f64,
+    /// Sweeps of the fit; 0 for Isomap.
+    pub sweeps: usize,
+    /// Whether the fit reached its tolerance.
+    pub converged: bool,
+    /// Log-likelihood (4) at the end; `None` for Isomap.
+    pub log_likelihood: Option<f64>,
+    /// That at the start and after each sweep.
+    pub trace: Vec<f64>,
+    /// The map straight after the embedding.
+    pub before: MapQuality,
+    /// The map returned.
+    pub after: MapQuality,
+    /// What took the flips away; see [`Rung::name`](crate::Rung::name).
+    pub rung: &'static str,
+    /// Iterations of the stretch minimisation; 0 if it was not asked for.
+    pub stretch_iterations: usize,
+    /// Whether the boundary of the result is simple: then the map, which has no flips, does not overlap itself.
+    pub boundary_is_simple: bool,
+    /// Seconds of each step, in order.
+    pub seconds: Vec<(&'static str, f64)>,
+}
+
+/// A patch in the plane, before and after its stretch was minimised.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Flattening {
+    /// A position for each vertex of the input as the embedding gave it, in the standard pose and in the unit of the
+    /// input; may have flips. NaN for vertices without faces.
+    pub embedded: Vec<[f64; 2]>,
+    /// The same without flips and with the least stretch.
+    pub uv: Vec<[f64; 2]>,
+    /// What was done and how good it is.
+    pub report: FlattenReport,
+}
+
+/// Flattens one connected patch of genus 0 with a boundary (holes allowed) as a single chart, whatever its stretch, and
+/// shows the steps of the paper (section 5, figure 2): geodesic distances, embedding, flips removed, stretch minimised.
+///
+/// The embedding uses the landmarks that `settings.geodesics` asks for; all vertices together where its fraction is 1
+/// (whatever the bounds) or the patch has at most `settings.together_max` vertices. `minimise` off stops when
+/// the flips are gone. Guaranteed: no triangle of `uv` is flipped. Unless the report says otherwise its boundary
+/// is simple, too, if it was minimised: where it ran over itself, minimisation is done again from a circle, as in
+/// [`unwrap`](crate::unwrap()). The same for any number of threads. Not guaranteed: a bound on the stretch.
+///
+/// As costly as the steps: O(k n log n) for the distances from k landmarks, then as
+/// [`embed_chart`](crate::embedding::embed_chart) and [`stretch::minimise_stretch`].
+///
+/// # Errors
+/// [`FlattenError`] says what is wrong with the patch and what to do.
+pub fn flatten(
+    input: &MeshInput<'_>,
+    minimise: bool,
+    settings: &Settings,
+    progress: &Progress,
+) -> Result<Flattening, FlattenError> {
+    progress.check()?;
+    settings.validate()?;
+    let mut clock = Clock::new();
+    progress.enter(Stage::Condition);
+    let surface = mesh::condition(input, &ConditionOptions { weld: settings.weld }, progress)?;
+    let vertex = one_patch(input, &surface)?;
+    clock.lap("condition");
+
+    progress.enter(Stage::Charts);
+    let steps = Steps::new(&surface.mesh, settings, settings.seed, progress);
+    let distances = distances(&steps, settings, progress)?;
+    clock.lap("distances");
+    progress.advance(Stage::Charts, 0.3);
+    let chart = steps.embed(&distances)?;
+    clock.lap("embedding");
+    progress.advance(Stage::Charts, 0.6);
+    let named = |error| stretch_error(error, &surface);
+    let (mut uv, mut rung) = steps.remove_flips(&chart.uv).map_err(named)?;
+    clock.lap("flips");
+    progress.advance(Stage::Charts, 0.7);
+    let mut stretch_iterations = 0;
+    if minimise {
+        let mut best = steps.minimise(&uv, None, None).map_err(named)?;
+        stretch_iterations = best.iterations;
+        if !steps.boundary_is_simple(&best.uv)
+            && let Some(circle) = steps.on_circle().map_err(named)?
+        {
+            best = steps.minimise(&circle, None, Some(BOUNDARY_REACH)).map_err(named)?;
+            stretch_iterations += best.iterations;
+            rung = crate::Rung::TutteCircle;
+        }
+        uv = best.uv;
+    }
+    clock.lap("stretch");
+
+    progress.enter(Stage::Verify);
+    let quality = |uv: &[Point2<f64>]| quality(&steps, &distances, uv);
+    let report = FlattenReport {
+        model: settings.embedding.model,
+        vertices: surface.mesh.vertex_count(),
+        triangles: surface.mesh.face_count(),
+        landmarks: chart.landmarks,
+        sigma: chart.sigma * surface.scale * surface.scale,
+        sweeps: chart.sweeps,
+        converged: chart.converged,
+        log_likelihood: chart.log_likelihood,
+        trace: chart.trace,
+        before: quality(&chart.uv),
+        after: quality(&uv),
+        rung: rung.name(),
+        stretch_iterations,
+        boundary_is_simple: steps.boundary_is_simple(&uv),
+        seconds: clock.into_laps(),
+    };
+    let to_input = |uv: &[Point2<f64>]| -> Vec<[f64; 2]> {
+        let place =
+            |v: &Option<VertexId>| v.map_or([f64::NAN; 2], |v| uv[v.index()].coords.map(|x| x * surface.scale).into());
+        vertex.iter().map(place).collect()
+    };
+    Ok(Flattening { embedded: to_input(&chart.uv), uv: to_input(&uv), report })
+}
+
+/// The vertex of the surface that each vertex of the input is, if the surface is one patch that can be flattened.
+fn one_patch(input: &MeshInput<'_>, surface: &Surface) -> Result<Vec<Option<VertexId>>, FlattenError> {
+    let mesh = &surface.mesh;
+    if let Some(&face) = surface.unmapped.first() {
+        return Err(FlattenError::NotFinite { face: face as usize });
+    }
+    if mesh.face_count() == 0 {
+        return Err(FlattenError::NoFaces);
+    }
+    // Conditioning scales to area 1 where there is more area than rounding makes of a line.
+    if mesh::measure::total_area(mesh) < 0.5 {
+        return Err(FlattenError::NoArea);
+    }
+    let (label, pieces) = mesh.components();
+    if let Some(other) = label.iter().position(|l| *l != label[0]) {
+        let [first, second] = [0, other].map(|f| surface.polygon[f] as usize);
+        return Err(FlattenError::Pieces { pieces, first, second });
+    }
+    let topology = mesh.topology();
+    if topology.genus() > 0 {
+        return Err(FlattenError::Handles { genus: topology.genus() });
+    }
+    if topology.loops == 0 {
+        return Err(FlattenError::Closed);
+    }
+    let mut vertex = vec![None; input.positions.len()];
+    for h in mesh.halfedges() {
+        let (of, v) = (input.corner_vertices[surface.corner[h.index()] as usize] as usize, mesh.from(h));
+        if vertex[of].replace(v).is_some_and(|other| other != v) {
+            return Err(FlattenError::Pinched { vertex: of });
+        }
+    }
+    Ok(vertex)
+}
+
+/// From all vertices or from landmarks, as the settings want it.
+fn distances(steps: &Steps<'_>, settings: &Settings, progress: &Progress) -> Result<LandmarkDistances, FlattenError> {
+    let (mesh, asked) = (steps.mesh, &settings.geodesics);
+    let n = mesh.vertex_count();
+    let all = asked.landmark_fraction >= 1.0 || n <= settings.together_max;
+    let landmarks = if all { n } else { asked.landmark_count(n) };
+    if landmarks > MOST_TOGETHER {
+        return Err(FlattenError::TooManyLandmarks { landmarks });
+    }
+    if all {
+        let every: Vec<_> = mesh.vertices().collect();
+        return Ok(geodesics::geodesic_distances(mesh, &every, asked.metric, progress)?);
+    }
+    Ok(geodesics::landmark_distances(mesh, asked, progress)?)
+}
+
+/// An error of the stretch stage with the numbers of the input.
+fn stretch_error(error: StretchError, surface: &Surface) -> FlattenError {
+    let of = |v: VertexId| surface.vertex[v.index()] as usize;
+    match error {
+        StretchError::Cancelled(cancelled) => FlattenError::Cancelled(cancelled),
+        StretchError::DoubledEdge { a, b } => FlattenError::DoubledEdge { a: of(a), b: of(b) },
+        other => FlattenError::Stretch(other),
+    }
+}
+
+fn quality(steps: &Steps<'_>, distances: &LandmarkDistances, uv: &[Point2<f64>]) -> MapQuality {
+    let mesh = steps.mesh;
+    let corners = |f| mesh.triangle(f).map(|v| uv[v.index()]);
+    let coord = |p: Point2<f64>| Coord { x: p.x, y: p.y };
+    let turned = |[a, b, c]: [Point2<f64>; 3]| {
+        let sign = orient2d(coord(a), coord(b), coord(c));
+        sign.is_nan() || sign <= 0.0
+    };
+    let rest_l_infinity = {
+        let least = mesh
+            .faces()
+            .map(|f| crate::distortion::singular_values(&steps.rest[f.index()].jacobian(corners(f)))[1])
+            .fold(f64::INFINITY, f64::min);
+        let plane: f64 = mesh.faces().map(|f| 0.5 * crate::distortion::signed_double_area(corners(f)).abs()).sum();
+        (plane / stretch::surface_area(&steps.rest)).sqrt() / least
+    };
+    MapQuality {
+        flips: mesh.faces().filter(|&f| turned(corners(f))).count(),
+        l2: stretch::l2_unsigned(mesh, uv, NEGLIGIBLE),
+        l_infinity: rest_l_infinity,
+        distance_correlation: distance_correlation(distances, uv),
+    }
+}
+
+/// Pearson's correlation over all pairs of a landmark and another vertex. Sums by rows, in order.
+fn distance_correlation(distances: &LandmarkDistances, uv: &[Point2<f64>]) -> f64 {
+    let pairs = |l: usize| {
+        let landmark = distances.landmarks()[l];
+        let row = distances.row(l).iter().enumerate().filter(move |(v, _)| *v != landmark.index());
+        row.map(move |(v, &d)| [f64::from(d), (uv[v] - uv[landmark.index()]).norm()])
+    };
+    let total = |term: &(dyn Fn([f64; 2]) -> [f64; 3] + Sync)| -> [f64; 3] {
+        let add = |a: [f64; 3], b: [f64; 3]| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+        let rows: Vec<[f64; 3]> =
+            (0..distances.len()).into_par_iter().map(|l| pairs(l).map(term).fold([0.0; 3], add)).collect();
+        rows.into_iter().fold([0.0; 3], add)
+    };
+    let [sum_d, sum_e, count] = total(&|[d, e]| [d, e, 1.0]);
+    let (mean_d, mean_e) = (sum_d / count, sum_e / count);
+    let [dd, de, ee] = total(&|[d, e]| {
+        let (d, e) = (d - mean_d, e - mean_e);
+        [d * d, d * e, e * e]
+    });
+    de / (dd * ee).sqrt()
+}
+
+#[cfg(test)]
+#[path = "flatten/tests.rs"]
+mod tests;
