@@ -20,6 +20,7 @@ mod grow;
 mod min_cut;
 mod polygon_graph;
 mod repair;
+mod smooth;
 mod spectral;
 mod straighten;
 
