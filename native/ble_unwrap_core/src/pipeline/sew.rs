@@ -385,8 +385,8 @@ fn longest_fit(points: &[[Complex<f64>; 2]], lengths: &[f64], most_edges: usize,
 }
 
 /// The union of parts of a fine mesh whose guides, charts of a coarse one, have been sewn: cut along the borders between
-/// the parts but where the nearest edge of the coarse border is sewn. `None` if that is not a chart with as many
-/// boundary loops as the guide's. O(n log n) and a look at each coarse edge of a border for each fine one.
+/// the parts but where the nearest edge of the coarse border is sewn. `None` where they do not hang together.
+/// O(n log n) and a look at each coarse edge of a border for each fine one.
 pub(super) fn carried_over(
     coarse: &TriMesh,
     fine: &TriMesh,
@@ -429,10 +429,8 @@ pub(super) fn carried_over(
         a != b && glued.binary_search(&h).is_err()
     };
     let (mesh, vertices) = fine.submesh(&faces, is_cut);
-    let (topology, wanted) = (mesh.topology(), sewn.chart.patch.mesh.topology());
     let polygon = faces.iter().map(|f| polygon[f.index()]).collect();
-    topology.is_chart().then_some(())?;
-    (topology.loops == wanted.loops).then_some(Patch { mesh, vertices, polygon, faces })
+    (mesh.components().1 == 1).then_some(Patch { mesh, vertices, polygon, faces })
 }
 
 fn middle(mesh: &TriMesh, h: HalfedgeId) -> Point3<f64> {
