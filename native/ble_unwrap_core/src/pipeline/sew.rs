@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::charts::{Chart, Patch};
 use crate::mesh::{DisjointSets, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::{Cancelled, Progress};
-use crate::settings::Settings;
+use crate::settings::{NEVER_SEWN, Settings};
 
 use super::flatten::{self, Polished};
 use super::rungs::{Rung, Rungs};
@@ -20,8 +20,6 @@ use super::rungs::{Rung, Rungs};
 /// Charts are sewn where their borders fit, by a rigid motion, up to this share (root of mean square over length) of the
 /// length that is sewn: a straight border and an arc of 75°. If that is over the limit, once more where they fit closer.
 const FITS: [f64; 2] = [0.05, 0.02];
-/// At least this share of √(area of the smaller chart) is sewn: charts that hang together by less are one in name only.
-const LEAST_SEWN: f64 = 0.2;
 /// Failed trials a chart may take part in before it is left alone.
 const MOST_FAILURES: usize = 3;
 /// Longer stretches of border are looked at in so many places only.
@@ -64,9 +62,11 @@ pub(super) fn sew(
     progress: &Progress,
 ) -> Result<(Vec<Sewn>, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
+    let most_faces = if settings.least_sewn < NEVER_SEWN { most_faces } else { 0 };
     let whole = |(i, chart)| Some(Piece::new(Sewn { chart, pieces: vec![i], edges: Vec::new() }));
     let pool: Vec<Option<Piece>> = charts.into_iter().enumerate().map(whole).collect();
-    let mut table = Table { mesh, polygon, owner: vec![(usize::MAX, 0); mesh.face_count()], pool };
+    let mut table =
+        Table { mesh, polygon, owner: vec![(usize::MAX, 0); mesh.face_count()], pool, least_sewn: settings.least_sewn };
     (0..table.pool.len()).for_each(|i| table.claim(i));
     loop {
         progress.check()?;
@@ -139,6 +139,8 @@ struct Table<'a> {
     /// The piece of each face, and its number there.
     owner: Vec<(usize, usize)>,
     pool: Vec<Option<Piece>>,
+    /// See [`Settings::least_sewn`].
+    least_sewn: f64,
 }
 
 impl Table<'_> {
@@ -235,7 +237,7 @@ impl Table<'_> {
         let [a, b] = run.pieces;
         let (one, other) = (self.pool[a].as_ref()?, self.pool[b].as_ref()?);
         let fit = one.refused.iter().filter(|r| r.0 == b).map(|r| r.1 + 1).max().unwrap_or(0);
-        let least = LEAST_SEWN * one.area.min(other.area).sqrt();
+        let least = self.least_sewn * one.area.min(other.area).sqrt();
         let number = |p: Point2<f64>| Complex::new(p.x, p.y);
         let mesh = self.mesh;
         let last = *run.edges.last()?;
