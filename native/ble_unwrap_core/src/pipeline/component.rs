@@ -16,11 +16,11 @@ use crate::segmentation;
 use crate::settings::Settings;
 
 use super::charting::{self, Charting};
+use super::darts::{self, Sewn};
 use super::flatten::{self, Polished};
 use super::merge::{self, Which};
 use super::prolong::{Prolonged, prolong};
 use super::rungs::Rungs;
-use super::sew::{self, Sewn};
 use super::tally::Tally;
 
 /// Components of more vertices are charted on a coarse mesh.
@@ -107,7 +107,7 @@ impl Whole {
         rungs: &mut Rungs,
         progress: &Progress,
     ) -> Result<Vec<Sewn>, Cancelled> {
-        let (sewn, steps) = sew::sew(&self.patch.mesh, &self.patch.polygon, charts, usize::MAX, settings, progress)?;
+        let (sewn, steps) = darts::sew(&self.patch.mesh, &self.patch.polygon, charts, usize::MAX, settings, progress)?;
         rungs.add(&steps);
         Ok(sewn)
     }
@@ -207,7 +207,7 @@ impl<'a> OnCoarse<'a> {
             let pieces: Vec<Part> = rest.iter_mut().filter(|p| mine(p)).filter_map(Option::take).collect();
             let (coarse, fine) = (&self.coarse.mesh, &self.fine.patch);
             let patches: Vec<(&Patch, &Chart)> = pieces.iter().map(|p| (&p.patch, &p.guide)).collect();
-            match sew::carried_over(coarse, &fine.mesh, &fine.polygon, &patches, &sewn) {
+            match darts::carried_over(coarse, &fine.mesh, &fine.polygon, &patches, &sewn) {
                 Some(patch) => joined.push(Part { patch, guide: sewn.chart, number: usize::MAX, pieces, family: None }),
                 None => joined.extend(pieces),
             }

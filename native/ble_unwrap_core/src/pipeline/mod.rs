@@ -7,12 +7,12 @@
 
 mod charting;
 mod component;
+mod darts;
 mod finish;
 mod flatten;
 mod merge;
 mod prolong;
 mod rungs;
-mod sew;
 mod steps;
 mod tally;
 

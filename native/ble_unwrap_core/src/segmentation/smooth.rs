@@ -203,3 +203,76 @@ impl Band<'_> {
         Share { label: own, polygons, value }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+
+    use super::*;
+    use crate::mesh::{FaceId, TriMesh, test_surfaces};
+
+    fn centre(mesh: &TriMesh, f: FaceId) -> Point3<f64> {
+        let [a, b, c] = mesh.triangle_positions(f);
+        Point3::from((a.coords + b.coords + c.coords) / 3.0)
+    }
+
+    fn smoothed(mesh: &TriMesh, label: impl Fn(Point3<f64>) -> u32, rings: usize) -> (Vec<u32>, Vec<u32>) {
+        let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
+        let graph = PolygonGraph::new(mesh, &polygon);
+        let start: Vec<u32> = mesh.faces().map(|f| label(centre(mesh, f))).collect();
+        let mut end = start.clone();
+        smooth(&graph, &Bends::new(mesh, &graph), &mut end, rings, &Progress::new()).expect("not cancelled");
+        (start, end)
+    }
+
+    /// Greatest distance of a border vertex with x between two bounds from a line through the origin of this slope.
+    fn farthest(mesh: &TriMesh, label: &[u32], slope: f64, x: [f64; 2]) -> f64 {
+        let differs = |h: &crate::mesh::HalfedgeId| {
+            let t = mesh.twin(*h);
+            !t.is_none() && label[h.face().index()] != label[t.face().index()]
+        };
+        let ends = mesh.edges().filter(differs).flat_map(|h| [mesh.position(mesh.from(h)), mesh.position(mesh.to(h))]);
+        let inner = ends.filter(|p| p.x > x[0] && p.x < x[1]);
+        inner.map(|p| (p.y - slope * p.x).abs() / slope.hypot(1.0)).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn stairs_that_no_cut_sees_become_a_line() {
+        // Steps of six along and three up: as long in edges as any other way of the same rise.
+        let mesh = test_surfaces::grid(60, 30, [60.0, 30.0], 0.0);
+        let (start, end) = smoothed(&mesh, |p| u32::from(p.y > 3.0 * (p.x / 6.0 + 0.5).floor()), 10);
+        let before = farthest(&mesh, &start, 0.5, [15.0, 45.0]);
+        let after = farthest(&mesh, &end, 0.5, [15.0, 45.0]);
+        assert!(before > 1.2, "{before}");
+        assert!(after < 0.8, "within an edge of the line, not {after}");
+    }
+
+    #[test]
+    fn a_border_near_a_crease_snaps_to_it() {
+        let flat = test_surfaces::grid(30, 30, [30.0, 30.0], 0.0);
+        let fold: Vec<Point3<f64>> =
+            flat.positions().iter().map(|p| Point3::new(p.x.min(15.0), p.y, (p.x - 15.0).max(0.0))).collect();
+        let triangles: Vec<[u32; 3]> = flat.triangles().iter().map(|t| t.map(|v| v.index() as u32)).collect();
+        let mesh = test_surfaces::mesh(&fold, &triangles);
+        let wave = |y: f64| 13.0 + (0.7 * y).sin();
+        let (_, end) = smoothed(&mesh, |p| u32::from(p.x + p.z > wave(p.y)), 10);
+        for f in mesh.faces() {
+            assert_eq!(end[f.index()], u32::from(centre(&mesh, f).z > 0.0), "{f} is on the wrong side of the crease");
+        }
+    }
+
+    #[test]
+    fn small_labels_stay_and_far_polygons_keep_theirs() {
+        let mesh = test_surfaces::grid(40, 40, [40.0, 40.0], 0.0);
+        let label = |p: Point3<f64>| if p.x.max(p.y) < 3.0 { 2 } else { u32::from(p.x > 20.0 + (p.y * 1.3).sin()) };
+        let (start, end) = smoothed(&mesh, label, 4);
+        let count = |labels: &[u32], l: u32| labels.iter().filter(|x| **x == l).count();
+        assert!(count(&end, 2) * 10 >= count(&start, 2) * 7, "{} of {}", count(&end, 2), count(&start, 2));
+        for f in mesh.faces() {
+            let p = centre(&mesh, f);
+            if (p.x - 20.0).abs() > 6.0 && p.x.max(p.y) > 9.0 {
+                assert_eq!(start[f.index()], end[f.index()]);
+            }
+        }
+    }
+}

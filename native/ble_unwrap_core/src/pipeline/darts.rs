@@ -473,3 +473,117 @@ fn longest_chain(mesh: &TriMesh, edges: &[HalfedgeId]) -> Vec<HalfedgeId> {
     let longest = (0..edges.len()).max_by(|&a, &b| length[a].total_cmp(&length[b]).then(b.cmp(&a)));
     edges.iter().zip(&root).filter(|(_, r)| Some(**r) == longest).map(|(h, _)| *h).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::test_surfaces;
+    use crate::pipeline::charting;
+
+    fn settings(stretch_limit: f64) -> Settings {
+        Settings { stretch_limit, ..Settings::default() }
+    }
+
+    /// Charts of a mesh whose faces are grouped by a label.
+    fn charts(mesh: &TriMesh, settings: &Settings, label: impl Fn([Point3<f64>; 3]) -> usize) -> Vec<Chart> {
+        let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
+        let count = mesh.faces().map(|f| label(mesh.triangle_positions(f))).max().map_or(0, |l| l + 1);
+        let chart = |wanted: usize| {
+            let faces = mesh.faces().filter(|f| label(mesh.triangle_positions(*f)) == wanted).collect();
+            let patch = Patch::of_surface(mesh, &polygon, faces);
+            let tried = charting::try_chart(&patch, settings, &mut Rungs::default(), &Progress::new());
+            tried.expect("not cancelled").expect("a chart")
+        };
+        (0..count).map(chart).collect()
+    }
+
+    fn sewn(mesh: &TriMesh, charts: Vec<Chart>, settings: &Settings) -> (Vec<Sewn>, Rungs) {
+        let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
+        let result = sew(mesh, &polygon, charts, usize::MAX, settings, &Progress::new()).expect("not cancelled");
+        for s in &result.0 {
+            assert!(s.chart.patch.mesh.topology().is_chart() && s.chart.l2 <= settings.stretch_limit);
+            assert_eq!(crate::stretch::first_flip(&s.chart.patch.mesh, &s.chart.uv), None);
+            assert!(crate::stretch::boundary_is_simple(&s.chart.patch.mesh, &s.chart.uv));
+        }
+        let faces: usize = result.0.iter().map(|s| s.chart.patch.faces.len()).sum();
+        assert_eq!(faces, mesh.face_count());
+        result
+    }
+
+    fn hemisphere(p: [Point3<f64>; 3]) -> usize {
+        usize::from(p[0].z + p[1].z + p[2].z > 0.0)
+    }
+
+    #[test]
+    fn the_longest_fit_of_a_bent_border_is_its_straight_part() {
+        let turn = Complex::from_polar(1.0, 0.7);
+        let shift = Complex::new(3.0, -1.0);
+        // The second bends away by a right angle after ten of sixteen edges.
+        let points: Vec<[Complex<f64>; 2]> = (0..=16)
+            .map(|k| {
+                let k = f64::from(k);
+                let bent = if k <= 10.0 { Complex::new(k, 0.0) } else { Complex::new(10.0, k - 10.0) };
+                [Complex::new(k, 0.0), (bent - shift) / turn]
+            })
+            .collect();
+        let exact = longest_fit(&points, &[1.0; 16], 16, 1e-9).expect("the straight part");
+        assert_eq!((exact.first, exact.last, exact.length), (0, 10, 10.0));
+        assert!((exact.motion.turn - turn).norm() < 1e-9 && (exact.motion.shift - shift).norm() < 1e-9);
+        let short = longest_fit(&points, &[1.0; 16], 4, 1e-9).expect("four edges");
+        assert_eq!(short.last - short.first, 4);
+        let loose = longest_fit(&points, &[1.0; 16], 16, 0.05).expect("more");
+        assert!(loose.length > 10.0 && loose.length < 14.0, "{}", loose.length);
+    }
+
+    #[test]
+    fn two_halves_of_a_sheet_are_sewn_all_along() {
+        let mesh = test_surfaces::grid(12, 12, [12.0, 12.0], 0.0);
+        let settings = settings(1.1);
+        let half = |p: [Point3<f64>; 3]| usize::from(p[0].x + p[1].x + p[2].x > 18.0);
+        let (sewn, rungs) = sewn(&mesh, charts(&mesh, &settings, half), &settings);
+        assert_eq!((sewn.len(), sewn[0].edges.len(), &sewn[0].pieces[..]), (1, 12, &[0, 1][..]));
+        assert!(sewn[0].chart.l2 < 1.0 + 1e-9);
+        assert!(rungs.taken().contains(&("dart", 1)));
+    }
+
+    #[test]
+    fn a_ball_of_two_halves_becomes_one_chart_that_hangs_together_on_an_arc() {
+        let mesh = test_surfaces::sphere(3);
+        let settings = settings(1.1);
+        let halves = charts(&mesh, &settings, hemisphere);
+        let least = settings.least_sewn * halves[0].patch.area().sqrt();
+        let (sewn, _) = sewn(&mesh, halves, &settings);
+        assert_eq!(sewn.len(), 1);
+        let length: f64 = sewn[0].edges.iter().map(|&h| mesh.edge_length(h)).sum();
+        assert!(length >= least && length < 3.0, "{length} of a circle of 6.28");
+        assert!(sewn[0].chart.patch.mesh.topology().is_disk());
+    }
+
+    #[test]
+    fn what_would_be_over_the_limit_or_is_not_wanted_stays_apart() {
+        let mesh = test_surfaces::sphere(3);
+        let loose = settings(1.1);
+        let halves = charts(&mesh, &loose, hemisphere);
+        let worst = halves.iter().map(|c| c.l2).fold(1.0, f64::max);
+        let tight = settings(worst + 1e-4);
+        assert_eq!(sewn(&mesh, halves.clone(), &tight).0.len(), 2);
+        let never = Settings { least_sewn: NEVER_SEWN, ..loose.clone() };
+        assert_eq!(sewn(&mesh, halves.clone(), &never).0.len(), 2);
+        let long = Settings { least_sewn: 2.0, ..loose };
+        assert_eq!(sewn(&mesh, halves, &long).0.len(), 2);
+    }
+
+    #[test]
+    fn a_seam_is_carried_over_to_the_mesh_it_came_from() {
+        let mesh = test_surfaces::sphere(3);
+        let settings = settings(1.1);
+        let halves = charts(&mesh, &settings, hemisphere);
+        let patches: Vec<Patch> = halves.iter().map(|c| c.patch.clone()).collect();
+        let (sewn, _) = sewn(&mesh, halves.clone(), &settings);
+        let pieces: Vec<(&Patch, &Chart)> = patches.iter().zip(&halves).collect();
+        let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
+        let patch = carried_over(&mesh, &mesh, &polygon, &pieces, &sewn[0]).expect("it hangs together");
+        assert_eq!(patch.mesh.topology(), sewn[0].chart.patch.mesh.topology());
+        assert_eq!(patch.faces, sewn[0].chart.patch.faces);
+    }
+}
