@@ -14,7 +14,7 @@ use crate::mesh::{DisjointSets, FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::{Cancelled, Progress};
 use crate::settings::{NEVER_SEWN, Settings};
 
-use super::flatten::{self, Polished};
+use super::flatten;
 use super::rungs::{Rung, Rungs};
 
 /// Charts are sewn where their borders fit, by a rigid motion, up to this share (root of mean square over length) of the
@@ -81,10 +81,8 @@ pub(super) fn sew(
                 let mut rungs = Rungs::default();
                 let (patch, start) = table.joined(seam);
                 let chart = if patch.mesh.topology().is_chart() {
-                    match flatten::polish(&patch, &start, settings, &mut rungs, progress)? {
-                        Polished::Chart(flat) => Some(flat.into_chart(patch)),
-                        _ => None,
-                    }
+                    let flat = flatten::polish(&patch, &start, Rung::Sewn, settings, &mut rungs, progress)?;
+                    flat.map(|flat| flat.into_chart(patch))
                 } else {
                     None
                 };
@@ -491,8 +489,9 @@ mod tests {
         let chart = |wanted: usize| {
             let faces = mesh.faces().filter(|f| label(mesh.triangle_positions(*f)) == wanted).collect();
             let patch = Patch::of_surface(mesh, &polygon, faces);
-            let tried = charting::try_chart(&patch, settings, &mut Rungs::default(), &Progress::new());
-            tried.expect("not cancelled").expect("a chart")
+            let charting = charting::chart(vec![patch], settings, &|_| (), &Progress::new()).expect("not cancelled");
+            assert_eq!(charting.charts.len(), 1);
+            charting.charts.into_iter().next().expect("a chart")
         };
         (0..count).map(chart).collect()
     }
