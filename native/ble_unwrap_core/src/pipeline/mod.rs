@@ -7,6 +7,7 @@
 
 mod charting;
 mod component;
+mod darts;
 mod finish;
 mod flatten;
 mod merge;
