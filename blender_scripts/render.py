@@ -126,10 +126,26 @@ def place_lights(scene, camera):
     return key, world
 
 
-def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=16):
+def taken(path):
+    """The pixels of a picture file as (h, w, 3) uint8; the file is removed."""
+    import bpy
+    import numpy as np
+
+    image = bpy.data.images.load(str(path))
+    image.colorspace_settings.name = "Non-Color"  # the values as they are in the file
+    pixels = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(image.size[1], image.size[0], image.channels)[::-1, :, :3]
+    bpy.data.images.remove(image)
+    Path(path).unlink()
+    return (pixels * 255 + 0.5).astype(np.uint8)
+
+
+def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=16, plain=False):
     """Renders objects through a UV map to a PNG file. Their materials and other objects' visibility are put back.
 
-    Clouds appear as a ball a point, in the colour of a plain checker at the point's UV.
+    `plain` shows a checker without numbers, which small pictures can tell. Clouds appear as a ball a point, in the
+    colour of that checker at the point's UV.
     """
     import addon_utils
     import bpy
@@ -166,6 +182,10 @@ def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=
     scene.cycles.seed = 0
     point_image = render_points.checker_image(cells)
     point_material = render_points.point_material(material, uv_map, point_image)
+    texture = next(node for node in material.node_tree.nodes if node.type == "TEX_IMAGE")
+    grid_image = texture.image
+    if plain:
+        texture.image = point_image
     try:
         with render_points.stand_ins(clouds, point_material, scene):
             bpy.ops.render.render(write_still=True)
@@ -177,7 +197,6 @@ def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=
                 slot.material = old
         for obj, state in hidden.items():
             obj.hide_render = state
-        image = next(node.image for node in material.node_tree.nodes if node.type == "TEX_IMAGE")
         scene.world, scene.camera = old_world, old_camera
         camera_data, key_data = camera.data, key.data
         bpy.data.objects.remove(camera)
@@ -188,7 +207,7 @@ def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=
         bpy.data.materials.remove(material)
         bpy.data.materials.remove(point_material)
         bpy.data.images.remove(point_image)
-        bpy.data.images.remove(image)
+        bpy.data.images.remove(grid_image)
 
 
 def map_names(objects):

@@ -1,0 +1,157 @@
+//! A flame graph of one unwrap: `cargo run --release --example flamegraph -- out.svg [mesh.obj]`.
+//!
+//! Samples itself by a timer signal, so it needs neither `perf` nor the right to use it. Without a mesh it
+//! unwraps a generated sculpt of 64,000 faces. On one thread: the graph shows work, not waiting.
+#![expect(clippy::print_stdout, reason = "a command line program")]
+
+use std::error::Error;
+
+#[cfg(unix)]
+mod obj;
+
+#[cfg(unix)]
+fn main() -> Result<(), Box<dyn Error>> {
+    sampled::main()
+}
+
+#[cfg(not(unix))]
+fn main() -> Result<(), Box<dyn Error>> {
+    Err("sampling a process by signals is for Unix".into())
+}
+
+#[cfg(unix)]
+mod sampled {
+    use std::collections::BTreeMap;
+    use std::error::Error;
+    use std::path::Path;
+    use std::time::Instant;
+    use std::{env, fs};
+
+    use ble_unwrap_core::{Atlas, MeshInput, Progress, Settings, unwrap};
+    use ble_unwrap_fixtures::{PolyMesh, sculpt_like};
+    use pprof::flamegraph::Options;
+    use pprof::{Frames, ProfilerGuardBuilder, Report};
+    use rayon::ThreadPoolBuilder;
+
+    use super::obj;
+
+    /// Quads of the generated mesh: 64,000 triangles.
+    const QUADS: usize = 32_000;
+    /// Samples a second of processor time; not a divisor of anything periodic.
+    const FREQUENCY: i32 = 997;
+    /// Unwraps are repeated until this much was sampled, so that small meshes give a graph, too,
+    const LEAST_SECONDS: f64 = 2.0;
+    /// but not more often than this.
+    const MOST_RUNS: usize = 200;
+    /// Rows of the printed table.
+    const ROWS: usize = 12;
+    /// Frames of these are how work is handed on, not what is done.
+    const PLUMBING: [&str; 10] = [
+        "rayon::", "rayon_core::", "<rayon", "core::ops::", "<core::", "std::panic", "core::panic", "std::sys", "<alloc::boxed",
+        "std::thread",
+    ];
+
+    pub(super) fn main() -> Result<(), Box<dyn Error>> {
+        let arguments: Vec<String> = env::args().skip(1).collect();
+        let (output, mesh) = match arguments.as_slice() {
+            [output] => (output, None),
+            [output, mesh] => (output, Some(mesh)),
+            _ => return Err("usage: flamegraph OUT.svg [MESH.obj]".into()),
+        };
+        let (name, mesh) = match mesh {
+            Some(path) => {
+                let name = Path::new(path).file_name().unwrap_or_default().to_string_lossy().into_owned();
+                let text = fs::read_to_string(path).map_err(|error| format!("{path}: {error}"))?;
+                (name, polygons(obj::read(&text).map_err(|error| format!("{path}: {error}"))?)?)
+            }
+            None => ("generated sculpt".to_string(), sculpt_like(QUADS)),
+        };
+        let (report, runs, seconds, atlas) = profile(&mesh)?;
+        let faces = atlas.report.faces;
+        println!("{name}: {faces} faces, {} charts, {:.2} s an unwrap on one thread", atlas.report.charts, seconds / runs as f64);
+        let samples: isize = report.data.values().sum();
+        if samples <= 0 {
+            return Err("the timer gave no sample: this system does not let a process profile itself".into());
+        }
+        print_table(&report, samples);
+        let mut options = Options::default();
+        options.title = format!("unwrap of {name}, {faces} faces: {samples} samples in {seconds:.1} s");
+        options.count_name = "samples".to_string();
+        options.image_width = Some(1600);
+        options.min_width = 0.05;
+        if let Some(directory) = Path::new(output).parent() {
+            fs::create_dir_all(directory)?;
+        }
+        let mut svg = Vec::new();
+        report.flamegraph_with_options(&mut svg, &mut options)?;
+        fs::write(output, svg)?;
+        println!("written to {output}");
+        Ok(())
+    }
+
+    /// The polygons of a file, which are checked by the library.
+    fn polygons((positions, faces): obj::Polygons) -> Result<PolyMesh, Box<dyn Error>> {
+        let faces = faces.into_iter().map(|face| face.into_iter().map(u32::try_from).collect());
+        let faces = faces.collect::<Result<Vec<Vec<u32>>, _>>().map_err(|_| "a face names a vertex before the first")?;
+        Ok(PolyMesh { positions, faces })
+    }
+
+    /// Samples of unwraps of a mesh, their number, their seconds, and the last one's result.
+    fn profile(mesh: &PolyMesh) -> Result<(Report, usize, f64, Atlas), Box<dyn Error>> {
+        let flat = mesh.flat();
+        let input = MeshInput {
+            positions: &mesh.positions,
+            corner_vertices: &flat.corner_vertices,
+            face_offsets: &flat.face_offsets,
+            corner_triangles: None,
+            seams: &[],
+        };
+        let one = ThreadPoolBuilder::new().num_threads(1).build()?;
+        let run = || one.install(|| unwrap(&input, &Settings::default(), &Progress::new()));
+        run()?; // what is done but once, such as reading tables into memory, is no part of it
+        // Unwinding inside these libraries can deadlock or crash.
+        let blocked = ["libc", "libgcc", "pthread", "vdso"];
+        let guard = ProfilerGuardBuilder::default().frequency(FREQUENCY).blocklist(&blocked).build()?;
+        let start = Instant::now();
+        let mut runs = 1;
+        let mut atlas = run()?;
+        while start.elapsed().as_secs_f64() < LEAST_SECONDS && runs < MOST_RUNS {
+            atlas = run()?;
+            runs += 1;
+        }
+        let seconds = start.elapsed().as_secs_f64();
+        let report = guard.report().frames_post_processor(without_plumbing).build()?;
+        Ok((report, runs, seconds, atlas))
+    }
+
+    /// Drops the frames of the thread pool, above the unwrap and in between.
+    fn without_plumbing(frames: &mut Frames) {
+        frames.thread_name = "unwrap".to_string();
+        for inlined in &mut frames.frames {
+            inlined.retain(|symbol| {
+                let name = symbol.name();
+                !PLUMBING.iter().any(|start| name.starts_with(start)) && !name.contains("__rust_begin_short_backtrace")
+            });
+        }
+        frames.frames.retain(|inlined| !inlined.is_empty());
+    }
+
+    /// The library's functions by their share of the samples in which they are the innermost of the library.
+    fn print_table(report: &Report, samples: isize) {
+        let mut own: BTreeMap<String, isize> = BTreeMap::new();
+        for (frames, count) in &report.data {
+            let innermost = frames.frames.iter().flatten().map(|symbol| symbol.name()).find(|name| is_ours(name));
+            *own.entry(innermost.unwrap_or_else(|| "elsewhere".to_string())).or_default() += count;
+        }
+        let mut rows: Vec<_> = own.into_iter().collect();
+        rows.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+        println!("share of the samples, with what is called outside the library:");
+        for (name, count) in rows.iter().take(ROWS) {
+            println!("  {:5.1} %  {name}", 100.0 * *count as f64 / samples as f64);
+        }
+    }
+
+    fn is_ours(name: &str) -> bool {
+        name.contains("ble_unwrap_core::")
+    }
+}
