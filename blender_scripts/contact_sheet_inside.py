@@ -105,7 +105,13 @@ def unwrapped(objects, smart):
         return [*found, (comparison.SMART_MAP, rows["smart_uv_best"], rows["smart_uv_best"]["seconds_total"])]
     comparison.activate_map(addon_loader.load("mesh_bridge").unique_meshes(objects), comparison.BLE_MAP)
     outcome = task.unwrap_objects(objects, settings)
-    return [(comparison.BLE_MAP, {**outcome.certificate.measured, "violations": outcome.certificate.violations}, outcome.seconds)]
+    return [
+        (
+            comparison.BLE_MAP,
+            {**outcome.certificate.measured, "violations": outcome.certificate.violations},
+            outcome.seconds,
+        )
+    ]
 
 
 def cell_of(name, objects, work, options):
@@ -159,19 +165,19 @@ def main(argv):
     todo = sources(options.models)
     for number, (name, load) in enumerate(todo, 1):
         started = time.perf_counter()
-        print(f"[{number}/{len(todo)}] {name}: ", end="", flush=True)
         try:
             objects = [obj for obj in load() if targets.is_surface(obj)]
             if not objects:
                 raise bridge.MeshError("holds no faces")
             cell, report[name] = cell_of(name, objects, options.output, options)
-            print(f"{engine.summary(report[name], report[name]['seconds_total'])}", end="")
+            said = engine.summary(report[name], report[name]["seconds_total"])
         except (*batch.USER_ERRORS, RuntimeError, OSError) as error:
             cell = failed_cell(name, str(error), options.size, 3 if options.compare else 2)
             failed[name] = str(error)
-            print(f"failed: {error}", end="")
+            said = f"failed: {error}"
         cells.append(cell)
-        print(f" ({time.perf_counter() - started:.1f} s with the pictures)", flush=True)
+        spent = time.perf_counter() - started
+        print(f"[{number}/{len(todo)}] {name}: {said} ({spent:.1f} s with the pictures)", flush=True)
     height = max(cell.shape[0] for cell in cells)
     cells = [np.concatenate([cell, _plain(height - cell.shape[0], cell.shape[1])]) for cell in cells]
     pictures.write_png(options.output, sheet(cells, options.columns))

@@ -74,7 +74,9 @@ def demonstrate_cloud(cloud, name, out, options):
         atlas = pictures.point_layout(uv, render_points.checker_colours(uv, CLOUD_CELLS), CLOUD_SIZE[1])
         found = outcome.certificate.measured
         captions = [f"{found['points']:,} points, no faces"], [f"{found['charts']} charts, stretch {found['l2']:.3f}"]
-        halves = [pictures.with_captions(half, text) for half, text in zip((render.taken(part), atlas), captions, strict=True)]
+        halves = [
+            pictures.with_captions(half, text) for half, text in zip((render.taken(part), atlas), captions, strict=True)
+        ]
         pictures.write_png(out / f"{name}_render.png", pictures.side_by_side(halves))
     return {
         **outcome.certificate.measured,
