@@ -105,13 +105,8 @@ def unwrapped(objects, smart):
         return [*found, (comparison.SMART_MAP, rows["smart_uv_best"], rows["smart_uv_best"]["seconds_total"])]
     comparison.activate_map(addon_loader.load("mesh_bridge").unique_meshes(objects), comparison.BLE_MAP)
     outcome = task.unwrap_objects(objects, settings)
-    return [
-        (
-            comparison.BLE_MAP,
-            {**outcome.certificate.measured, "violations": outcome.certificate.violations},
-            outcome.seconds,
-        )
-    ]
+    measured = {**outcome.certificate.measured, "violations": outcome.certificate.violations}
+    return [(comparison.BLE_MAP, measured, outcome.seconds)]
 
 
 def cell_of(name, objects, work, options):

@@ -64,10 +64,9 @@ def table(rows):
             lines.append(f"| {row['name']} | {row['faces']:,} | failed: {row['failed']} ||||||")
             continue
         faces, cpu, peak = row["faces"], row["cpu"], row["peak"]
-        lines.append(
-            f"| {row['name']} | {faces:,} | {row['charts']:,} | {cpu:.2f} | {row['wall']:.2f} | {1e6 * cpu / faces:.0f} |"
-            f" {peak / 1e6:.1f} | {peak / KIB / faces:.2f} |"
-        )
+        cells = [row["name"], f"{faces:,}", f"{row['charts']:,}", f"{cpu:.2f}", f"{row['wall']:.2f}"]
+        cells += [f"{1e6 * cpu / faces:.0f}", f"{peak / 1e6:.1f}", f"{peak / KIB / faces:.2f}"]
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
 

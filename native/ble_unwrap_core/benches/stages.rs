@@ -243,9 +243,9 @@ impl Sheet {
         Self { mesh, rest, uv }
     }
 
-    fn folded(side: usize) -> Self {
+    fn folded(side: usize, share: f64) -> Self {
         let sheet = Self::embedded(side);
-        let uv = surfaces::folded(&sheet.uv);
+        let uv = surfaces::folded(&sheet.uv, share);
         assert!(first_flip(&sheet.mesh, &uv).is_some(), "a fold turns triangles over");
         Self { uv, ..sheet }
     }
@@ -270,7 +270,8 @@ fn embedding(criterion: &mut Criterion, one: &ThreadPool) {
             Sheet::size(side),
             || measured(&surfaces::face(side)),
             |distances| {
-                embed_chart(distances, &EmbeddingSettings::default(), 0, &Progress::new()).expect("a sheet has an extent")
+                embed_chart(distances, &EmbeddingSettings::default(), 0, &Progress::new())
+                    .expect("a sheet has an extent")
             },
             |_, found| found.converged && found.uv.len() == side * side,
         );
@@ -278,18 +279,21 @@ fn embedding(criterion: &mut Criterion, one: &ThreadPool) {
     group.finish();
 }
 
+/// A narrow fold is cleared in its neighbourhood, a wide one on the whole chart.
 fn flips(criterion: &mut Criterion, one: &ThreadPool) {
     let mut group = group(criterion, "make_injective");
-    for side in FACES {
-        case(
-            &mut group,
-            one,
-            BenchmarkId::new("folded_face", Sheet::size(side)),
-            Sheet::size(side),
-            || Sheet::folded(side),
-            Sheet::without_flips,
-            |sheet, uv| first_flip(&sheet.mesh, uv).is_none(),
-        );
+    for (name, share) in [("narrow_fold", 0.08), ("wide_fold", 0.3)] {
+        for side in FACES {
+            case(
+                &mut group,
+                one,
+                BenchmarkId::new(name, Sheet::size(side)),
+                Sheet::size(side),
+                || Sheet::folded(side, share),
+                Sheet::without_flips,
+                |sheet, uv| first_flip(&sheet.mesh, uv).is_none(),
+            );
+        }
     }
     group.finish();
 }
@@ -332,8 +336,7 @@ fn packing(criterion: &mut Criterion, one: &ThreadPool) {
             charts,
             || (0..charts).map(surfaces::blob).collect::<Vec<_>>(),
             |blobs| {
-                let items: Vec<_> =
-                    blobs.iter().map(|(points, triangles)| PackItem { points, triangles }).collect();
+                let items: Vec<_> = blobs.iter().map(|(points, triangles)| PackItem { points, triangles }).collect();
                 pack(&items, &PackSettings::default(), &Progress::new()).expect("charts that fit")
             },
             |_, packed| packed.poses.len() == charts && packed.efficiency > 0.4,
@@ -370,7 +373,8 @@ fn verification(criterion: &mut Criterion, one: &ThreadPool) {
             },
             |mapped| {
                 let Mapped { positions, triangles, corners, atlas } = mapped;
-                let texture = Texture::square(Settings::default().packing.width, Settings::default().packing.margin_texels);
+                let texture =
+                    Texture::square(Settings::default().packing.width, Settings::default().packing.margin_texels);
                 let mesh = UvMesh::new(positions, triangles, &atlas.uv, corners, &atlas.chart, texture);
                 verify(&mesh.expect("one UV a corner"), &[], &Progress::new()).expect("not cancelled")
             },

@@ -50,13 +50,13 @@ pub(crate) fn ring(across: usize) -> TriMesh {
     tri_mesh(&torus(0.4, 2 * across, across))
 }
 
-/// A copy of a map in the plane with one smooth fold in its middle, over about a hundredth of its area: some triangles
-/// are turned over there, as an embedding leaves them that looks at distances alone.
-pub(crate) fn folded(uv: &[Point2<f64>]) -> Vec<Point2<f64>> {
+/// A copy of a map in the plane with one smooth fold in its middle, as wide as this share of the map: some triangles are
+/// turned over there, as an embedding leaves them that looks at distances alone.
+pub(crate) fn folded(uv: &[Point2<f64>], share: f64) -> Vec<Point2<f64>> {
     let mean = |k: usize| uv.iter().map(|p| p[k]).sum::<f64>() / uv.len() as f64;
     let centre = Point2::new(mean(0), mean(1));
     let extent = uv.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
-    let width = 0.08 * extent;
+    let width = share * extent;
     uv.iter()
         .map(|p| {
             let r = (p - centre) / width;
@@ -71,7 +71,8 @@ pub(crate) fn blob(k: usize) -> (Vec<Point2<f64>>, Vec<[u32; 3]>) {
     const AROUND: usize = 96;
     const RINGS: usize = 6;
     let fraction = |step: f64| (k as f64 * step).fract();
-    let (waves, depth, turn) = (2 + k % 5, 0.15 + 0.3 * fraction(0.618_033_988_749_894_9), TAU * fraction(0.754_877_666));
+    let (waves, depth, turn) =
+        (2 + k % 5, 0.15 + 0.3 * fraction(0.618_033_988_749_894_9), TAU * fraction(0.754_877_666));
     let size = 0.2 + fraction(0.569_840_290_998).powi(3);
     let aspect = 1.0 + 1.5 * fraction(0.324_717_957_244);
     let mut points = vec![Point2::origin()];

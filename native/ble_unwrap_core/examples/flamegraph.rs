@@ -44,12 +44,10 @@ mod sampled {
     /// but not more often than this.
     const MOST_RUNS: usize = 200;
     /// Rows of the printed table.
-    const ROWS: usize = 12;
-    /// Frames of these are how work is handed on, not what is done.
-    const PLUMBING: [&str; 10] = [
-        "rayon::", "rayon_core::", "<rayon", "core::ops::", "<core::", "std::panic", "core::panic", "std::sys", "<alloc::boxed",
-        "std::thread",
-    ];
+    const ROWS: usize = 15;
+    /// Frames of these crates are how work is handed on, or loops and arithmetic: their time is their caller's.
+    const PLUMBING: [&str; 7] = ["rayon", "rayon-core", "core", "alloc", "std", "panic_unwind", "flamegraph"];
+    const OURS: &str = "ble_unwrap_core";
 
     pub(super) fn main() -> Result<(), Box<dyn Error>> {
         let arguments: Vec<String> = env::args().skip(1).collect();
@@ -68,7 +66,11 @@ mod sampled {
         };
         let (report, runs, seconds, atlas) = profile(&mesh)?;
         let faces = atlas.report.faces;
-        println!("{name}: {faces} faces, {} charts, {:.2} s an unwrap on one thread", atlas.report.charts, seconds / runs as f64);
+        println!(
+            "{name}: {faces} faces, {} charts, {:.2} s an unwrap on one thread",
+            atlas.report.charts,
+            seconds / runs as f64
+        );
         let samples: isize = report.data.values().sum();
         if samples <= 0 {
             return Err("the timer gave no sample: this system does not let a process profile itself".into());
@@ -92,7 +94,8 @@ mod sampled {
     /// The polygons of a file, which are checked by the library.
     fn polygons((positions, faces): obj::Polygons) -> Result<PolyMesh, Box<dyn Error>> {
         let faces = faces.into_iter().map(|face| face.into_iter().map(u32::try_from).collect());
-        let faces = faces.collect::<Result<Vec<Vec<u32>>, _>>().map_err(|_| "a face names a vertex before the first")?;
+        let faces =
+            faces.collect::<Result<Vec<Vec<u32>>, _>>().map_err(|_| "a face names a vertex before the first")?;
         Ok(PolyMesh { positions, faces })
     }
 
@@ -109,7 +112,7 @@ mod sampled {
         let one = ThreadPoolBuilder::new().num_threads(1).build()?;
         let run = || one.install(|| unwrap(&input, &Settings::default(), &Progress::new()));
         run()?; // what is done but once, such as reading tables into memory, is no part of it
-        // Unwinding inside these libraries can deadlock or crash.
+        // Unwinding inside these libraries can deadlock or crash: what malloc and memmove take is not seen.
         let blocked = ["libc", "libgcc", "pthread", "vdso"];
         let guard = ProfilerGuardBuilder::default().frequency(FREQUENCY).blocklist(&blocked).build()?;
         let start = Instant::now();
@@ -120,38 +123,80 @@ mod sampled {
             runs += 1;
         }
         let seconds = start.elapsed().as_secs_f64();
-        let report = guard.report().frames_post_processor(without_plumbing).build()?;
+        let report = guard.report().frames_post_processor(by_place).build()?;
         Ok((report, runs, seconds, atlas))
     }
 
-    /// Drops the frames of the thread pool, above the unwrap and in between.
-    fn without_plumbing(frames: &mut Frames) {
+    /// Names each frame by where its source lies, `stage::file::function`, and drops those that say nothing. Frames that
+    /// were inlined carry bare names of functions: `run` could be anybody's.
+    fn by_place(frames: &mut Frames) {
         frames.thread_name = "unwrap".to_string();
         for inlined in &mut frames.frames {
-            inlined.retain(|symbol| {
+            inlined.retain_mut(|symbol| {
                 let name = symbol.name();
-                !PLUMBING.iter().any(|start| name.starts_with(start)) && !name.contains("__rust_begin_short_backtrace")
+                let label = match symbol.filename.as_deref() {
+                    Some(file) => label(file, &name),
+                    // Assembly of the kernels of linear algebra, and of the system's libraries.
+                    None => Some(without_generics(&name)).filter(|name| !name.is_empty()),
+                };
+                symbol.name = label.map(String::into_bytes);
+                symbol.name.is_some()
             });
         }
         frames.frames.retain(|inlined| !inlined.is_empty());
     }
 
-    /// The library's functions by their share of the samples in which they are the innermost of the library.
+    /// `None` for plumbing and for closures, whose time is that of the function around them.
+    fn label(file: &Path, name: &str) -> Option<String> {
+        let parts: Vec<String> =
+            file.with_extension("").iter().map(|part| part.to_string_lossy().into_owned()).collect();
+        let source = parts.iter().rposition(|part| part == "src")?;
+        let directory = parts.get(source.checked_sub(1)?)?;
+        // A directory of the registry carries a version: faer-0.24.4.
+        let crate_name = match directory.rsplit_once('-') {
+            Some((name, version)) if version.starts_with(|c: char| c.is_ascii_digit()) => name,
+            _ => directory,
+        };
+        let function = without_generics(name);
+        let function = function.rsplit("::").find(|part| !part.is_empty())?;
+        if PLUMBING.contains(&crate_name) || function.starts_with('{') {
+            return None;
+        }
+        let mut path: Vec<&str> =
+            parts[source + 1..].iter().map(String::as_str).filter(|part| *part != "mod").collect();
+        if crate_name != OURS {
+            path.insert(0, crate_name);
+        }
+        path.push(function);
+        Some(path.join("::"))
+    }
+
+    fn without_generics(name: &str) -> String {
+        let mut depth = 0;
+        let mut kept = String::new();
+        for c in name.replace("->", "").chars() {
+            match c {
+                '<' => depth += 1,
+                '>' => depth -= 1,
+                _ if depth == 0 => kept.push(c),
+                _ => {}
+            }
+        }
+        kept
+    }
+
+    /// The functions in which most samples were taken.
     fn print_table(report: &Report, samples: isize) {
         let mut own: BTreeMap<String, isize> = BTreeMap::new();
         for (frames, count) in &report.data {
-            let innermost = frames.frames.iter().flatten().map(|symbol| symbol.name()).find(|name| is_ours(name));
+            let innermost = frames.frames.iter().flatten().next().map(|symbol| symbol.name());
             *own.entry(innermost.unwrap_or_else(|| "elsewhere".to_string())).or_default() += count;
         }
         let mut rows: Vec<_> = own.into_iter().collect();
         rows.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
-        println!("share of the samples, with what is called outside the library:");
+        println!("share of the samples by function, without what it calls:");
         for (name, count) in rows.iter().take(ROWS) {
             println!("  {:5.1} %  {name}", 100.0 * *count as f64 / samples as f64);
         }
-    }
-
-    fn is_ours(name: &str) -> bool {
-        name.contains("ble_unwrap_core::")
     }
 }
