@@ -131,6 +131,8 @@ mod sampled {
     /// were inlined carry bare names of functions: `run` could be anybody's.
     fn by_place(frames: &mut Frames) {
         frames.thread_name = "unwrap".to_string();
+        let raw: Vec<String> = frames.frames.iter().flatten().map(|s| format!("{} @ {}", s.name(), s.filename())).take(6).collect();
+        let count = frames.frames.len();
         for inlined in &mut frames.frames {
             inlined.retain_mut(|symbol| {
                 let name = symbol.name();
@@ -144,6 +146,7 @@ mod sampled {
             });
         }
         frames.frames.retain(|inlined| !inlined.is_empty());
+        if frames.frames.is_empty() { println!("DEBUG {count} {raw:?}"); }
     }
 
     /// `None` for plumbing and for closures, whose time is that of the function around them.
