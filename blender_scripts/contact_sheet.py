@@ -1,4 +1,4 @@
-"""One picture of many models: each rendered under a checker, beside its layout coloured by stretch.
+"""One picture of many models: each under a checker from two sides, beside its layout coloured by stretch.
 
 python blender_scripts/contact_sheet.py [MODEL ...] [-o out/contact_sheet.png] [--compare smart] [--zip FILE]
 

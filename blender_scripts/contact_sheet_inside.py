@@ -1,6 +1,6 @@
-"""The part of the contact sheet that runs in Blender: unwrap, render, draw. Started by contact_sheet.py.
+"""The part of the contact sheet that runs in Blender: unwrap, render from two sides, draw. Started by contact_sheet.py.
 
-blender -b -P blender_scripts/contact_sheet_inside.py -- [MODEL ...] -o SHEET.png [--compare smart] [--size 420]
+blender -b -P blender_scripts/contact_sheet_inside.py -- [MODEL ...] -o SHEET.png [--compare smart] [--size 360]
 
 Writes SHEET.png and, beside it, SHEET.json with what was measured. Without models: the meshes of the demonstration. A
 model that cannot be read or unwrapped gets a cell that says why, and the exit code 1.
@@ -20,8 +20,11 @@ import pictures
 import render
 
 SAMPLES = 16
-# Of the checker, along the side of the texture: fields of some seven pixels in a picture of 420.
+# Of the checker, along the side of the texture: fields of some six pixels in a picture of 360.
 CELLS = 48
+SIZE = 360
+# From the front and from behind: a seam that only one of them shows would look hidden.
+VIEWS = ((0.62, -1.0, 0.42), (-0.62, 1.0, 0.42))
 COLUMNS = 3
 GAP = 14
 NAME_SCALE, TEXT_SCALE = 3, 2
@@ -114,10 +117,14 @@ def cell_of(name, objects, work, options):
     rows = unwrapped(objects, options.compare == "smart")
     map_name, measured, seconds = rows[0]
     picture = work.with_name(f".{work.stem}_render.png")
-    render.render_objects(
-        objects, picture, map_name, size=(options.size, options.size), samples=SAMPLES, cells=CELLS, plain=True
-    )
-    panels = [render.taken(picture), *(layout_of(objects, row[0], options.size) for row in rows)]
+    panels = []
+    for view in VIEWS:
+        size = (options.size, options.size)
+        render.render_objects(
+            objects, picture, map_name, size=size, samples=SAMPLES, cells=CELLS, plain=True, view=view
+        )
+        panels.append(render.taken(picture))
+    panels += [layout_of(objects, row[0], options.size) for row in rows]
     lines = caption(name, measured, seconds)
     if len(rows) > 1:
         lines.append("Smart UV Project: " + "  ".join(caption("", *rows[1][1:])[1:])[: panels[0].shape[1]])
@@ -145,7 +152,7 @@ def main(argv):
     parser.add_argument("models", nargs="*", metavar="MODEL")
     parser.add_argument("-o", "--output", required=True, type=Path)
     parser.add_argument("--compare", choices=["smart"])
-    parser.add_argument("--size", type=int, default=420, help="pixels of one picture (default: 420)")
+    parser.add_argument("--size", type=int, default=SIZE, help=f"pixels of one picture (default: {SIZE})")
     parser.add_argument("--columns", type=int, default=COLUMNS)
     options = parser.parse_args(argv)
     if not 64 <= options.size <= 2048 or not 1 <= options.columns <= 16:
@@ -167,7 +174,7 @@ def main(argv):
             cell, report[name] = cell_of(name, objects, options.output, options)
             said = engine.summary(report[name], report[name]["seconds_total"])
         except (*batch.USER_ERRORS, RuntimeError, OSError) as error:
-            cell = failed_cell(name, str(error), options.size, 3 if options.compare else 2)
+            cell = failed_cell(name, str(error), options.size, len(VIEWS) + (2 if options.compare else 1))
             failed[name] = str(error)
             said = f"failed: {error}"
         cells.append(cell)

@@ -69,13 +69,14 @@ def is_cloud(obj):
     return addon_loader.load("targets").is_cloud(obj)
 
 
-def place_camera(scene, points, aspect):
-    """A camera that sees all points as large as they fit."""
+def place_camera(scene, points, aspect, view=None):
+    """A camera that sees all points as large as they fit; `view` is where it stands, seen from the model."""
     import bpy
     import mathutils
     import numpy as np
 
-    backward = np.array(VIEW_FROM) / np.linalg.norm(VIEW_FROM)
+    backward = np.array(VIEW_FROM if view is None else view, float)
+    backward /= np.linalg.norm(backward)
     right = np.cross((0.0, 0.0, 1.0), backward)
     right /= np.linalg.norm(right)
     up = np.cross(backward, right)
@@ -141,11 +142,11 @@ def taken(path):
     return (pixels * 255 + 0.5).astype(np.uint8)
 
 
-def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=16, plain=False):
+def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=16, plain=False, view=None):
     """Renders objects through a UV map to a PNG file. Their materials and other objects' visibility are put back.
 
-    `plain` shows a checker without numbers, which small pictures can tell. Clouds appear as a ball a point, in the
-    colour of that checker at the point's UV.
+    `plain` shows a checker without numbers, which small pictures can tell; `view` as for `place_camera`. Clouds appear
+    as a ball a point, in the colour of that checker at the point's UV.
     """
     import addon_utils
     import bpy
@@ -165,7 +166,7 @@ def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=
             obj.data.materials.append(None)
         for slot in obj.material_slots:
             slot.material = material
-    camera = place_camera(scene, world_points(objects), size[0] / size[1])
+    camera = place_camera(scene, world_points(objects), size[0] / size[1], view)
     key, world = place_lights(scene, camera)
     settings = scene.render
     settings.engine = "CYCLES"

@@ -25,11 +25,11 @@ def test_caption():
 
 
 def test_a_caption_fits_its_cell():
-    """The longest line there may be, in the smallest letters, over two pictures of the usual size."""
+    """The longest line there may be, in the smallest letters, over the pictures of the usual size."""
     line = inside.caption(
         "a", {**MEASURED, "charts": 1234, "faces": 1_234_567, "flips": 12, "l_infinity": 123.45}, 999.9
     )
-    assert max(len(text) for text in line[1:]) * 6 * inside.TEXT_SCALE <= 2 * 420 + inside.GAP
+    assert max(len(text) for text in line[1:]) * 6 * inside.TEXT_SCALE <= 3 * inside.SIZE + 2 * inside.GAP
 
 
 def test_every_character_of_a_caption_can_be_drawn():
@@ -98,17 +98,19 @@ def test_whole_sheet(run_script, files, tmp_path):
     image = bpy.data.images.load(str(tmp_path / "sheet.png"))
     width, height = image.size
     pixels = np.array(image.pixels[:]).reshape(height, width, -1)[::-1, :, :3]
-    cell = 414
+    cell = 3 * 200 + 2 * inside.GAP
     assert width == 2 * (cell + 2 * inside.GAP)
     assert read_png(tmp_path / "sheet.png")[1] == (height, width)
     head = 10 * inside.NAME_SCALE + 2 * 10 * inside.TEXT_SCALE + 6 + inside.GAP
     for number in range(2):
         left = number * (cell + 2 * inside.GAP) + inside.GAP
-        render = pixels[head : head + 200, left : left + 200]
-        corner, middle = render[:8, :8].reshape(-1, 3), render[70:130, 70:130].reshape(-1, 3)
-        assert corner.mean() > 0.3 and np.ptp(corner, axis=0).max() < 0.1, "an even background, not black"
-        assert np.ptp(middle, axis=0).max() > 0.15, "the checker shows"
-        layout = pixels[head : head + 200, left + 214 : left + 414].reshape(-1, 3)
+        first, second, layout = (pixels[head : head + 200, left + k * (200 + inside.GAP) :][:, :200] for k in range(3))
+        for render in (first, second):
+            corner, middle = render[:8, :8].reshape(-1, 3), render[70:130, 70:130].reshape(-1, 3)
+            assert corner.mean() > 0.3 and np.ptp(corner, axis=0).max() < 0.1, "an even background, not black"
+            assert np.ptp(middle, axis=0).max() > 0.15, "the checker shows"
+        assert np.abs(first - second).max() > 0.2, "two sides of the model"
+        layout = layout.reshape(-1, 3)
         empty = np.abs(layout - pictures.EMPTY / 255).max(axis=1) < 0.01
         assert 0.2 < 1 - empty.mean() < 0.95, "charts are drawn, and room is left between"
 
@@ -118,7 +120,7 @@ def test_smart_as_well(run_script, files, tmp_path):
     source = files("box.obj")
     done = run_script("contact_sheet_inside.py", source, "-o", "sheet.png", "--size", "160", "--compare", "smart")
     assert done.returncode == 0, done.stdout
-    assert read_png(tmp_path / "sheet.png")[1][1] == 3 * 160 + 2 * inside.GAP + 2 * inside.GAP
+    assert read_png(tmp_path / "sheet.png")[1][1] == 4 * 160 + 3 * inside.GAP + 2 * inside.GAP
 
 
 @pytest.mark.parametrize("wrong", [["--size", "8"], ["--columns", "0"], ["--compare", "other"]])

@@ -30,7 +30,7 @@ mod sampled {
     use ble_unwrap_core::{Atlas, MeshInput, Progress, Settings, unwrap};
     use ble_unwrap_fixtures::{PolyMesh, sculpt_like};
     use pprof::flamegraph::Options;
-    use pprof::{Frames, ProfilerGuardBuilder, Report};
+    use pprof::{Frames, ProfilerGuardBuilder, Report, Symbol};
     use rayon::ThreadPoolBuilder;
 
     use super::obj;
@@ -47,6 +47,8 @@ mod sampled {
     const ROWS: usize = 15;
     /// Frames of these crates are how work is handed on, or loops and arithmetic: their time is their caller's.
     const PLUMBING: [&str; 7] = ["rayon", "rayon-core", "core", "alloc", "std", "panic_unwind", "flamegraph"];
+    /// Assembly does not tell where it was called from. The products of small matrices in sparse factorisations are such.
+    const NO_TABLES: &str = "assembly without unwinding tables (matrix kernels)";
     const OURS: &str = "ble_unwrap_core";
 
     pub(super) fn main() -> Result<(), Box<dyn Error>> {
@@ -131,8 +133,6 @@ mod sampled {
     /// were inlined carry bare names of functions: `run` could be anybody's.
     fn by_place(frames: &mut Frames) {
         frames.thread_name = "unwrap".to_string();
-        let raw: Vec<String> = frames.frames.iter().flatten().map(|s| format!("{} @ {}", s.name(), s.filename())).take(6).collect();
-        let count = frames.frames.len();
         for inlined in &mut frames.frames {
             inlined.retain_mut(|symbol| {
                 let name = symbol.name();
@@ -146,7 +146,10 @@ mod sampled {
             });
         }
         frames.frames.retain(|inlined| !inlined.is_empty());
-        if frames.frames.is_empty() { println!("DEBUG {count} {raw:?}"); }
+        if frames.frames.is_empty() {
+            let name = Some(NO_TABLES.as_bytes().to_vec());
+            frames.frames.push(vec![Symbol { name, addr: None, lineno: None, filename: None }]);
+        }
     }
 
     /// `None` for plumbing and for closures, whose time is that of the function around them.
