@@ -125,6 +125,9 @@ def plot(rows, path):
     times.set(xscale="log", yscale="log", xlabel="faces (triangles)", ylabel="CPU seconds", title="time")
     memory.set(xscale="log", xlabel="faces (triangles)", ylabel="peak memory, KiB a face", title="memory")
     memory.set_ylim(0, _ceiling(measured))
+    if measured:
+        times.set_xlim(0.7 * low, 2.5 * high)  # the name of the largest model needs room
+        memory.set_xlim(0.7 * low, 2.5 * high)
     for axes in (times, memory):
         axes.grid(True, which="major", alpha=0.3)
         axes.legend(fontsize=8)
