@@ -205,4 +205,39 @@ mod sampled {
             println!("  {:5.1} %  {name}", 100.0 * *count as f64 / samples as f64);
         }
     }
+
+    #[cfg(test)]
+    mod tests {
+        use super::*;
+
+        #[test]
+        fn frames_are_named_by_their_source() {
+            let cases = [
+                ("native/ble_unwrap_core/src/stretch/newton.rs", "minimise", Some("stretch::newton::minimise")),
+                ("/x/ble_unwrap_core/src/packing/mod.rs", "ble_unwrap_core::packing::pack", Some("packing::pack")),
+                (
+                    "src/faer-0.24.4/src/sparse/linalg/cholesky.rs",
+                    "solve<u32, f64>",
+                    Some("faer::sparse::linalg::cholesky::solve"),
+                ),
+                ("/x/private-gemm-x86-0.1.20/src/lib.rs", "<A as B<C>>::gemm", Some("private-gemm-x86::lib::gemm")),
+                ("native/ble_unwrap_core/src/lib.rs", "f<fn(u8) -> u8>", Some("lib::f")),
+                ("native/ble_unwrap_core/src/pipeline/merge.rs", "{closure#4}<u8>", None),
+                ("/x/rayon-core-1.13.0/src/join/mod.rs", "join_context", None),
+                ("/rustc/1234/library/core/src/ops/function.rs", "call_mut", None),
+                ("no/such/place.rs", "f", None),
+                ("src/main.rs", "main", None),
+            ];
+            for (file, name, expected) in cases {
+                assert_eq!(label(Path::new(file), name).as_deref(), expected, "{file} {name}");
+            }
+        }
+
+        #[test]
+        fn faces_before_the_first_vertex_are_refused() {
+            let positions = vec![[0.0; 3]; 3];
+            assert!(polygons((positions.clone(), vec![vec![0, 1, -1]])).is_err());
+            assert_eq!(polygons((positions, vec![vec![0, 1, 2]])).expect("a triangle").faces, [[0, 1, 2]]);
+        }
+    }
 }
