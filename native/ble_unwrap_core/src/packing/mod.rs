@@ -28,6 +28,7 @@
 //! two-dimensional irregular packing problem, Operations Research 54(3), 2006 (local search over the
 //! order of placement).
 
+mod alone;
 mod cover;
 mod density;
 mod grid;
@@ -38,7 +39,11 @@ mod outline;
 mod place;
 mod pose;
 mod raster;
+mod refine;
+mod search;
+mod settle;
 mod shape;
+mod sketch;
 #[cfg(test)]
 mod tests;
 
@@ -273,22 +278,20 @@ pub fn pack(items: &[PackItem<'_>], settings: &PackSettings, progress: &Progress
     progress.check()?;
     let outline = |(i, item)| Outline::new(item, i);
     let outlines: Vec<Outline> = items.par_iter().enumerate().map(outline).collect::<Result<_, _>>()?;
-    let (best, grid) = density::densest(&outlines, settings, progress)?;
+    let dense = density::densest(&outlines, settings, progress)?;
     let texels = f64::from(settings.width) * f64::from(settings.height);
     let middle = 0.5 * Vector2::new(f64::from(settings.width), f64::from(settings.height));
     let mut covered = 0.0;
     let mut poses = Vec::with_capacity(items.len());
-    for ((outline, shape), placed) in outlines.iter().zip(&best.shapes).zip(&best.layout.placed) {
-        let pose = match placed {
-            Some(at) => grid.to_texture(shape.footprints[at.footprint].pose(at.x, at.y)),
-            // Only items without triangles are not placed.
-            None => Pose { cos: 1.0, sin: 0.0, centre: outline.centre, scale: best.density, offset: middle },
-        };
+    for (outline, place) in outlines.iter().zip(&dense.places) {
+        // Only items without triangles are not placed.
+        let nowhere = Pose { cos: 1.0, sin: 0.0, centre: outline.centre, scale: dense.density, offset: middle };
+        let pose = place.map_or(nowhere, |p| p.pose);
         let area = outline.area * (outline.extent * pose.scale).powi(2);
-        covered += area.min(shape.cells as f64 * grid.cell * grid.cell);
+        covered += area.min(place.map_or(0.0, |p| p.touched));
         poses.push(pose);
     }
-    let specks = best.shapes.iter().filter(|s| s.is_speck).count();
+    let specks = dense.places.iter().flatten().filter(|p| p.is_speck).count();
     let size = [settings.width, settings.height];
-    Ok(Packed { poses, efficiency: covered / texels, texels_per_unit: best.density, specks, size })
+    Ok(Packed { poses, efficiency: covered / texels, texels_per_unit: dense.density, specks, size })
 }

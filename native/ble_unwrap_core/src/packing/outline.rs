@@ -1,5 +1,7 @@
 //! The boundary of a set of triangles, for rasters that do not depend on their number.
 
+use std::collections::HashMap;
+
 use nalgebra::Point2;
 use robust::{Coord, orient2d};
 
@@ -75,7 +77,7 @@ impl Outline {
             }
         }
         half.sort_unstable();
-        let mut new_index = std::collections::HashMap::new();
+        let mut new_index = HashMap::new();
         let mut points = Vec::new();
         let mut edges = Vec::new();
         let mut keep = |v: u32| {
@@ -93,6 +95,42 @@ impl Outline {
             }
         }
         Ok(Self { points, edges, area, centre, extent })
+    }
+
+    /// The outline with its vertices moved together on a lattice of `step` units, which leaves far fewer
+    /// edges: for rasters of cells much larger than that. Every vertex moves by at most `step`; the
+    /// chain stays closed, for its boundary moves along.
+    pub(super) fn coarsened(&self, step: f64) -> Self {
+        let mut new_index: HashMap<(i64, i64), u32> = HashMap::new();
+        let mut points = Vec::new();
+        let of = |p: &Point2<f64>| {
+            let key = ((p.x / step).round() as i64, (p.y / step).round() as i64);
+            *new_index.entry(key).or_insert_with(|| {
+                points.push(*p);
+                points.len() as u32 - 1
+            })
+        };
+        let to: Vec<u32> = self.points.iter().map(of).collect();
+        let mut moved: Vec<(u32, u32, i32)> = self
+            .edges
+            .iter()
+            .map(|e| {
+                let (from, to) = (to[e.from as usize], to[e.to as usize]);
+                if from < to { (from, to, e.winding) } else { (to, from, -e.winding) }
+            })
+            .collect();
+        moved.sort_unstable();
+        let mut edges = Vec::with_capacity(moved.len());
+        for same in moved.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            let (from, to) = (same[0].0, same[0].1);
+            let winding: i32 = same.iter().map(|e| e.2).sum();
+            // What has shrunk to a line is still there.
+            if from != to || edges.is_empty() {
+                let (from, to) = if winding >= 0 { (from, to) } else { (to, from) };
+                edges.push(Edge { from, to, winding: winding.abs() });
+            }
+        }
+        Self { points, edges, ..*self }
     }
 
     /// What one unit of `points` is in the chart plane.

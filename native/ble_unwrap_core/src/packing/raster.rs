@@ -47,6 +47,10 @@ pub(super) fn rasterise(outline: &Outline, turn: [f64; 2], scale: f64, inflation
         }
     }
     fill(&mut mask, &mut crossings);
+    if mask.is_empty() {
+        let (x, y) = (mask.width() / 2, mask.height() / 2);
+        mask.set_run(y, x, x);
+    }
     Raster { mask, shift }
 }
 
@@ -54,6 +58,9 @@ pub(super) fn rasterise(outline: &Outline, turn: [f64; 2], scale: f64, inflation
 fn cover_segment(mask: &mut Mask, p: Point2<f64>, q: Point2<f64>, e: f64) {
     let (p, q) = if p.y <= q.y { (p, q) } else { (q, p) };
     let clamp = |v: f64, n: usize| (v.floor().max(0.0) as usize).min(n - 1);
+    if q.y + e < 0.0 || q.y + e < (p.y - e).floor() {
+        return;
+    }
     let (first, last) = (clamp(p.y - e, mask.height()), clamp(q.y + e, mask.height()));
     let slope = (q.x - p.x) / (q.y - p.y);
     for row in first..=last {
