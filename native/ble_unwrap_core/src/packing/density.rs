@@ -7,7 +7,7 @@ use super::grid::Grid;
 use super::mask::Reach;
 use super::outline::Outline;
 use super::pose::base_turns;
-use super::refine::{Refinement, most_placements};
+use super::refine::Refinement;
 use super::search::{Best, Search};
 use super::shape::SAFETY_TEXELS;
 use super::sketch::{growth, most_promising};
@@ -73,28 +73,39 @@ impl Effort {
                 sketches: 4,
             },
             Quality::High => Self {
-                across: 40.0,
-                least: 256.0,
+                across: 50.0,
+                least: 384.0,
                 most: 2048.0,
-                attempts: (20_000 / charts.max(1)).clamp(60, 400),
-                sketches: 16,
+                attempts: (30_000 / charts.max(1)).clamp(100, 500),
+                sketches: 24,
             },
         }
     }
 }
 
-/// Places outlines at the greatest density found.
+/// What it took: attempts on the coarse grid and placements on the fine one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Trials {
+    pub(super) attempts: usize,
+    pub(super) placements: u32,
+}
+
+/// Places outlines at the greatest density found, and tells how many trials that took.
 ///
 /// # Errors
 /// [`PackError::MarginTooLarge`], [`PackError::TooManyCharts`], [`PackError::Cancelled`].
-pub(super) fn densest(outlines: &[Outline], settings: &PackSettings, progress: &Progress) -> Result<Dense, PackError> {
+pub(super) fn densest(
+    outlines: &[Outline],
+    settings: &PackSettings,
+    progress: &Progress,
+) -> Result<(Dense, Trials), PackError> {
     let n = outlines.len();
     let grid = Grid::new(settings, n)?;
     let mut solid = (0..n).filter(|&i| !outlines[i].edges.is_empty());
     if let (Some(which), None) = (solid.next(), solid.next())
         && outlines[which].extent > 0.0
     {
-        return Ok(alone(outlines, which, grid, settings));
+        return Ok((alone(outlines, which, grid, settings), Trials::default()));
     }
     let largest = outlines.iter().map(|o| o.extent).fold(0.0, f64::max);
     let area = |i: usize| outlines[i].area * (outlines[i].extent / largest).powi(2);
@@ -115,8 +126,9 @@ pub(super) fn densest(outlines: &[Outline], settings: &PackSettings, progress: &
         width: settings.width,
         height: settings.height,
     };
+    let mut trials = Trials::default();
     if largest <= 0.0 {
-        return fine.once(1.0)?.map(|best| dense(&best, grid)).ok_or(too_many);
+        return fine.once(1.0)?.map(|best| (dense(&best, grid), trials)).ok_or(too_many);
     }
     // No chart is larger than the texture.
     let ceiling = f64::from(settings.width).hypot(f64::from(settings.height)) / largest;
@@ -134,22 +146,24 @@ pub(super) fn densest(outlines: &[Outline], settings: &PackSettings, progress: &
         ..fine
     };
     let found = search.run(guess, ceiling)?;
-    debug_assert!(found.attempts <= search.most_attempts());
+    trials.attempts += found.attempts;
     let mut refinement = Refinement::new(outlines, grid, ceiling, settings, progress);
     let refined = refinement.best_of(&most_promising(found.sketches, effort.sketches))?;
-    debug_assert!(refinement.placements <= most_placements(effort.sketches));
+    trials.placements = refinement.placements;
     if let Some(dense) = refined {
-        return Ok(dense);
+        return Ok((dense, trials));
     }
     // More charts than the coarse grid holds, or a texture of a few texels.
     let fine = Search { outlines, grid, growth: SAFETY_TEXELS / grid.cell, ..search };
     let fine = Search { reach: Reach::new(settings.margin_texels / grid.cell), budget: LAST_RESORT, ..fine };
-    let best = match fine.run(guess, ceiling)?.best {
+    let found = fine.run(guess, ceiling)?;
+    trials.attempts += found.attempts;
+    let best = match found.best {
         Some(best) => Some(best),
         // Every chart a speck or a point: whether they fit at all.
         None => fine.once(0.5 / largest)?,
     };
-    best.map(|best| dense(&best, grid)).ok_or(too_many)
+    best.map(|best| (dense(&best, grid), trials)).ok_or(too_many)
 }
 
 /// Base angles to try, by chart; `areas` tell which are large.

@@ -375,6 +375,25 @@ mod tests {
         }
 
         #[test]
+        fn pasting_moves_and_clips(
+            width in 1usize..150, columns in 1usize..200, cells in prop::collection::vec((0usize..150, 0usize..9), 1..20),
+            x in -160isize..210, y in -12isize..30,
+        ) {
+            let source = random_mask(width, 9, &cells);
+            let mut target = Mask::new(200, 20);
+            target.set(7, 3);
+            target.paste(&source, x, y, columns);
+            for b in 0..20 {
+                for a in 0..200 {
+                    let (p, q) = (a as isize - x, b as isize - y);
+                    let from = (0..width as isize).contains(&p) && (0..9).contains(&q) && a < columns;
+                    let expected = (a, b) == (7, 3) || from && source.get(p as usize, q as usize);
+                    prop_assert_eq!(target.get(a, b), expected, "cell {} {}", a, b);
+                }
+            }
+        }
+
+        #[test]
         fn runs_set_count_and_clear(width in 1usize..300, a in 0usize..300, b in 0usize..300) {
             let (a, b) = (a % width, b % width);
             let (a, b) = (a.min(b), a.max(b));

@@ -124,7 +124,7 @@ impl Outline {
         for same in moved.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
             let (from, to) = (same[0].0, same[0].1);
             let winding: i32 = same.iter().map(|e| e.2).sum();
-            // What has shrunk to a line is still there.
+            // What has shrunk to a line or a point is still there.
             if from != to || edges.is_empty() {
                 let (from, to) = if winding >= 0 { (from, to) } else { (to, from) };
                 edges.push(Edge { from, to, winding: winding.abs() });
@@ -173,6 +173,41 @@ mod tests {
         let wire = outline(&points, &[[0, 3, 1]]);
         assert!(wire.edges.len() == 3 && wire.edges.iter().all(|e| e.winding == 0));
         assert_eq!(wire.area, 0.0);
+    }
+
+    #[test]
+    fn coarsening_keeps_the_chain_closed_and_the_shape() {
+        // A ring of 2 × 600 edges whose inner circle is too fine for the lattice of a twentieth.
+        let n = 600u32;
+        let circle = |r: f64| {
+            (0..n).map(move |k| {
+                let t = std::f64::consts::TAU * f64::from(k) / f64::from(n);
+                [r * t.cos(), r * t.sin()]
+            })
+        };
+        let points: Vec<[f64; 2]> = circle(1.0).chain(circle(0.3)).collect();
+        let triangles: Vec<[u32; 3]> = (0..n)
+            .flat_map(|k| {
+                let next = (k + 1) % n;
+                [[k, next, n + k], [next, n + next, n + k]]
+            })
+            .collect();
+        let fine = outline(&points, &triangles);
+        let coarse = fine.coarsened(0.05);
+        assert!(coarse.edges.len() * 5 < fine.edges.len(), "{} edges", coarse.edges.len());
+        let mut flow = vec![0; coarse.points.len()];
+        for e in &coarse.edges {
+            flow[e.from as usize] -= e.winding;
+            flow[e.to as usize] += e.winding;
+        }
+        assert!(flow.iter().all(|&f| f == 0), "as many edges arrive as leave");
+        let area = |o: &Outline| -> f64 {
+            let at = |v: u32| o.points[v as usize].coords;
+            o.edges.iter().map(|e| 0.5 * f64::from(e.winding) * at(e.from).perp(&at(e.to))).sum()
+        };
+        assert!((area(&coarse) / area(&fine) - 1.0).abs() < 0.1, "{} of {}", area(&coarse), area(&fine));
+        // However coarse, something is left.
+        assert!(!fine.coarsened(9.0).edges.is_empty());
     }
 
     #[test]

@@ -12,7 +12,7 @@ use super::{PackError, PackSettings};
 use crate::Progress;
 
 /// Half the side of the windows charts are looked for in first, in cells of the sketch.
-const WINDOW: f64 = 2.0;
+const WINDOW: f64 = 1.0;
 /// Share of the height by which a placement may overshoot and still tell by how much.
 const OVERSHOOT: usize = 16;
 /// Placements of a sketch until one fits, each less dense; of a further sketch there is one, slightly
@@ -20,16 +20,11 @@ const OVERSHOOT: usize = 16;
 const SHRINKS: u32 = 14;
 const BETTER: f64 = 1.002;
 /// Placements of a sketch from the first fit on.
-const GROWTHS: u32 = 7;
+const GROWTHS: u32 = 5;
 /// Least and greatest step of density while nothing was too dense.
 const STEPS: [f64; 2] = [1.002, 1.01];
 /// Densities this close to too dense are not improved on.
 const CLOSE: f64 = 1.0005;
-
-/// Most placements made for a number of sketches.
-pub(super) fn most_placements(sketches: usize) -> u32 {
-    sketches as u32 * (SHRINKS + GROWTHS)
-}
 
 /// Refines sketches on the fine grid.
 pub(super) struct Refinement<'a> {

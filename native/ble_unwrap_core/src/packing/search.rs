@@ -102,11 +102,6 @@ impl Search<'_> {
         strategies.into_par_iter().map(attempt).collect()
     }
 
-    /// More attempts than [`Search::run`] ever makes.
-    pub(super) fn most_attempts(&self) -> usize {
-        self.budget + COMPARED + SHRINKS as usize * COMPARED
-    }
-
     /// One attempt at one density.
     ///
     /// # Errors

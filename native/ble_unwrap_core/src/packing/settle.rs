@@ -14,7 +14,7 @@ use crate::{Cancelled, Progress};
 /// What a cell to the right costs in rows when a place is chosen.
 const LEAN: f64 = 0.3;
 /// What a cell to the right counts in rows when pieces are put in order.
-const SWEEP: f64 = 0.5;
+const SWEEP: f64 = 0.25;
 /// Times a window may be doubled, and in how many of them reservations are kept.
 const DOUBLINGS: u32 = 5;
 const POLITE: u32 = 2;
