@@ -47,7 +47,7 @@ pub(super) struct Dense {
     pub(super) density: f64,
 }
 
-/// How much is tried.
+/// One search on a coarse grid, and what is made of it.
 #[derive(Clone, Copy, Debug)]
 struct Effort {
     /// Cells of the coarse grid across the square each chart would have if all were equal, and
@@ -62,23 +62,18 @@ struct Effort {
 }
 
 impl Effort {
-    fn new(charts: usize, quality: Quality) -> Self {
+    /// The searches for so many charts, one after the other.
+    fn new(charts: usize, quality: Quality) -> Vec<Self> {
+        let grid = Self { across: 28.0, least: 128.0, most: 384.0, attempts: 0, sketches: 0 };
+        // A few charts have few orders and many poses, and an attempt costs next to nothing.
+        let attempts = |all: usize, least, most| (all / charts.max(1)).clamp(least, most);
         match quality {
-            Quality::Fast => Self {
-                across: 20.0,
-                least: 128.0,
-                most: 1024.0,
-                // A few charts have few orders and many poses, and an attempt costs next to nothing.
-                attempts: (600 / charts.max(1)).clamp(30, 60),
-                sketches: 4,
-            },
-            Quality::High => Self {
-                across: 50.0,
-                least: 384.0,
-                most: 2048.0,
-                attempts: (30_000 / charts.max(1)).clamp(100, 500),
-                sketches: 24,
-            },
+            Quality::Fast => vec![Self { attempts: attempts(600, 30, 60), sketches: 4, ..grid }],
+            Quality::High => {
+                let (attempts, sketches) = (attempts(20_000, 80, 400), 16);
+                let finer = Self { across: 50.0, least: 384.0, most: 2048.0, attempts, sketches };
+                vec![Self { attempts, sketches, ..grid }, finer]
+            }
         }
     }
 }
@@ -133,29 +128,30 @@ pub(super) fn densest(
     // No chart is larger than the texture.
     let ceiling = f64::from(settings.width).hypot(f64::from(settings.height)) / largest;
     let guess = (first_guess((0..n).map(area), settings, grid) / largest).min(ceiling);
-    let effort = Effort::new(n, settings.quality);
-    let coarse = Grid::coarse(settings, (effort.across * (n as f64).sqrt()).clamp(effort.least, effort.most));
-    let lattice = |o: &Outline| (COARSENED * coarse.cell / (guess * o.extent)).clamp(1e-6, 0.1);
-    let simple: Vec<Outline> = outlines.par_iter().map(|o| o.coarsened(lattice(o))).collect();
-    let search = Search {
-        outlines: &simple,
-        grid: coarse,
-        growth: growth(settings.margin_texels, coarse),
-        reach: Reach::new(0.0),
-        budget: effort.attempts,
-        ..fine
-    };
-    let found = search.run(guess, ceiling)?;
-    trials.attempts += found.attempts;
+    let mut sketches = Vec::new();
+    for effort in Effort::new(n, settings.quality) {
+        let coarse = Grid::coarse(settings, (effort.across * (n as f64).sqrt()).clamp(effort.least, effort.most));
+        let lattice = |o: &Outline| (COARSENED * coarse.cell / (guess * o.extent)).clamp(1e-6, 0.1);
+        let simple: Vec<Outline> = outlines.par_iter().map(|o| o.coarsened(lattice(o))).collect();
+        let search = Search {
+            outlines: &simple,
+            grid: coarse,
+            growth: growth(settings.margin_texels, coarse),
+            reach: Reach::new(0.0),
+            budget: effort.attempts,
+            ..fine
+        };
+        let found = search.run(guess, ceiling)?;
+        trials.attempts += found.attempts;
+        sketches.extend(most_promising(found.sketches, effort.sketches));
+    }
     let mut refinement = Refinement::new(outlines, grid, ceiling, settings, progress);
-    let refined = refinement.best_of(&most_promising(found.sketches, effort.sketches))?;
+    let refined = refinement.best_of(&sketches)?;
     trials.placements = refinement.placements;
     if let Some(dense) = refined {
         return Ok((dense, trials));
     }
     // More charts than the coarse grid holds, or a texture of a few texels.
-    let fine = Search { outlines, grid, growth: SAFETY_TEXELS / grid.cell, ..search };
-    let fine = Search { reach: Reach::new(settings.margin_texels / grid.cell), budget: LAST_RESORT, ..fine };
     let found = fine.run(guess, ceiling)?;
     trials.attempts += found.attempts;
     let best = match found.best {

@@ -310,24 +310,23 @@ fn blobs_pack_well() {
 
 #[test]
 fn few_charts_are_turned_to_fit() {
-    // 0.72, 0.73 and 0.74 when this was written; with three angles a chart instead of eight 0.69 to 0.71.
-    for count in [2, 4, 8] {
-        let mean: f64 = (1..=4)
-            .map(|seed| {
-                let charts = blobs(count, seed);
-                let settings = square(2048, 4.0);
-                let packed = packed(&charts, &settings);
-                check(&charts, &settings, &packed);
-                packed.efficiency.ln()
-            })
-            .sum::<f64>()
-            / 4.0;
-        println!("MEAN {count} {}", mean.exp());
+    // 0.625, 0.748 and 0.784 when this was written.
+    for (count, floor) in [(2, 0.61), (4, 0.73), (8, 0.765)] {
+        let mean = |seed: u64| {
+            let charts = blobs(count, seed);
+            let settings = square(2048, 4.0);
+            let packed = packed(&charts, &settings);
+            check(&charts, &settings, &packed);
+            packed.efficiency.ln()
+        };
+        let mean = (0.25 * (1..=4).map(mean).sum::<f64>()).exp();
+        assert!(mean > floor, "{count} blobs cover {mean} on average");
     }
 }
 
 #[test]
 fn effort_is_bounded() {
+    // Trials, not time: about half of these when this was written.
     for (count, quality, attempts, placements) in [
         (2, Quality::Fast, 80, 40),
         (30, Quality::Fast, 60, 40),
@@ -339,7 +338,6 @@ fn effort_is_bounded() {
         let outlines: Vec<Outline> =
             items(&charts).iter().enumerate().map(|(i, c)| Outline::new(c, i).expect("valid")).collect();
         let (_, trials) = density::densest(&outlines, &settings, &Progress::new()).expect("charts fit");
-        println!("TRIALS {count} {trials:?}");
         assert!(trials.attempts <= attempts, "{} attempts for {count} charts", trials.attempts);
         assert!(trials.placements <= placements, "{} placements for {count} charts", trials.placements);
         assert!(trials.attempts > 0 && trials.placements > 0, "charts are searched and refined");
