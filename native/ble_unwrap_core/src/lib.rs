@@ -46,5 +46,5 @@ pub use mesh::{MeshError, MeshInput};
 pub use pipeline::{Atlas, Rung, Rungs, unwrap};
 pub use progress::{Cancelled, Progress, Stage};
 pub use report::Report;
-pub use settings::{ChartScale, Holes, Settings};
+pub use settings::{ChartScale, Holes, NEVER_SEWN, Settings};
 pub use verify::{Certificate, Defect, verify};

@@ -7,11 +7,13 @@
 
 mod charting;
 mod component;
+mod darts;
 mod finish;
 mod flatten;
 mod merge;
 mod prolong;
 mod rungs;
+mod sew;
 mod steps;
 mod tally;
 
