@@ -1,8 +1,8 @@
 //! Settings by keyword. One table names every setting, its place in the core and its range; parsing,
 //! defaults and error messages all come from it.
 
-use ble_unwrap_core::Settings;
 use ble_unwrap_core::packing::PackSettings;
+use ble_unwrap_core::{NEVER_SEWN, Settings};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyString};
 
@@ -161,6 +161,7 @@ const TABLE: &[Setting] = &[
     row("weld", Field::Flag(|c| &mut c.settings.weld), FLATTEN),
     row("coarse", Field::Flag(|c| &mut c.settings.coarse), CLOUD),
     row("merge", Field::Flag(|c| &mut c.settings.merge), UNWRAP),
+    row("least_sewn", Field::Real(|c| &mut c.settings.least_sewn, Interval::closed(0.0, NEVER_SEWN)), UNWRAP),
     row("holes", Field::Word(|c| &mut c.settings.holes), UNWRAP),
     row("chart_scale", Field::Word(|c| &mut c.settings.chart_scale), UNWRAP),
     row("seed", Field::Seed(|c| &mut c.settings.seed), EMBED),

@@ -126,6 +126,9 @@ fn start(job: &Job, mesh: MeshArrays, call: Call) -> PyResult<()> {
 ///     Whether large pieces of surface are cut into charts on a coarse mesh first, which is many times faster.
 /// merge : bool
 ///     Whether charts are joined again where their union stays under the limit.
+/// least_sewn : float, 0 to 1000
+///     Charts are sewn along a part of their border, the rest left as a dart, where that is at least this share of the
+///     square root of the smaller one's area. Less for fewer charts, more for compact ones, 1000 for no darts.
 /// holes : {"keep", "cut"}
 ///     Whether charts may have holes or are cut to disks.
 /// chart_scale : {"uniform", "stretch"}

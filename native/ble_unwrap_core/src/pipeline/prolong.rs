@@ -56,6 +56,8 @@ struct CoarseCuts {
     edges: Vec<[VertexId; 2]>,
     /// The ends of cuts on the border of the uncut chart.
     landings: Vec<VertexId>,
+    /// The ends of cuts inside it: of darts.
+    tips: Vec<VertexId>,
 }
 
 fn coarse_cuts(coarse: &Coarse, chart: &Chart, local: &[FaceId], done: impl Fn(HalfedgeId) -> bool) -> CoarseCuts {
@@ -76,7 +78,10 @@ fn coarse_cuts(coarse: &Coarse, chart: &Chart, local: &[FaceId], done: impl Fn(H
     let mut landings: Vec<VertexId> = edges.iter().flatten().copied().filter(|v| border[v.index()]).collect();
     landings.sort_unstable();
     landings.dedup();
-    CoarseCuts { edges, landings }
+    let mut ends: Vec<VertexId> = edges.iter().flatten().copied().filter(|v| !border[v.index()]).collect();
+    ends.sort_unstable();
+    let tips = ends.chunk_by(|v, w| v == w).filter(|same| same.len() == 1).map(|same| same[0]).collect();
+    CoarseCuts { edges, landings, tips }
 }
 
 /// Edges of the fine part that run where the coarse cuts do: for each a shortest path between the same vertices, and
@@ -99,12 +104,13 @@ fn fine_cuts(coarse: &Coarse, part: &Patch, cuts: &CoarseCuts) -> Vec<HalfedgeId
     }
     let landings = cuts.landings.iter().filter_map(|&v| fine(v));
     paths.extend(landings.map(|from| path(part, from, None, LONGEST_DETOUR * longest)));
-    without_stubs(&part.mesh, paths.concat())
+    let tips: Vec<VertexId> = cuts.tips.iter().filter_map(|&v| fine(v)).collect();
+    without_stubs(&part.mesh, paths.concat(), &tips)
 }
 
-/// Leaves out edges that lead nowhere: two paths that meet in a vertex may have run on together, and the sides of a slit
+/// Leaves out edges that lead nowhere, neither to the border nor to the tip of a dart: two paths that meet in a vertex may have run on together, and the sides of a slit
 /// are free to overlap in the plane.
-fn without_stubs(mesh: &TriMesh, mut edges: Vec<HalfedgeId>) -> Vec<HalfedgeId> {
+fn without_stubs(mesh: &TriMesh, mut edges: Vec<HalfedgeId>, tips: &[VertexId]) -> Vec<HalfedgeId> {
     let edge = |h: HalfedgeId| if mesh.is_boundary(h) { h } else { h.min(mesh.twin(h)) };
     edges.iter_mut().for_each(|h| *h = edge(*h));
     edges.sort_unstable();
@@ -114,7 +120,7 @@ fn without_stubs(mesh: &TriMesh, mut edges: Vec<HalfedgeId>) -> Vec<HalfedgeId> 
         for v in edges.iter().flat_map(|&h| [mesh.from(h), mesh.to(h)]) {
             *ends.entry(v).or_default() += 1;
         }
-        let leads_on = |v: VertexId| ends[&v] > 1 || mesh.is_boundary_vertex(v);
+        let leads_on = |v: VertexId| ends[&v] > 1 || mesh.is_boundary_vertex(v) || tips.contains(&v);
         let before = edges.len();
         edges.retain(|&h| leads_on(mesh.from(h)) && leads_on(mesh.to(h)));
         if edges.len() == before {

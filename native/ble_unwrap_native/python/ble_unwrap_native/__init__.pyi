@@ -100,6 +100,7 @@ class _Settings(_FlattenSettings, _PackSettings, total=False):
     stretch_limit: float
     coarse: bool
     merge: bool
+    least_sewn: float
     holes: Literal["keep", "cut"]
     chart_scale: Literal["uniform", "stretch"]
 
