@@ -68,6 +68,7 @@ pub(super) struct Shape {
 
 impl Shape {
     /// Footprints at `density` texels to a unit of the chart plane, on cells of `cell` texels.
+    /// The charts are grown by `growth` cells before they are rasterised.
     pub(super) fn new(
         outline: &Outline,
         turns: &[[f64; 2]],

@@ -8,8 +8,8 @@ use super::shape::Shape;
 /// By how many cells less than the whole margin's half charts are grown on the coarse grid. Every cell
 /// a chart touches would be up to a cell too much at each of its sides, none would be too little: with
 /// more than this the fine placement has to be less dense than the sketch, with less the sketch is
-/// loose (measured: 0.1 to 0.2 is best from 2 to 300 charts).
-const SHRUNK: f64 = 0.1;
+/// loose (measured from 2 to 300 charts: 0 to 0.1 is best).
+const SHRUNK: f64 = 0.05;
 /// Sketches that use the height of the grid to these shares are worth refining.
 const WORTHY: std::ops::RangeInclusive<f64> = 0.9..=1.05;
 /// Centres nearer than so many cells are the same.
