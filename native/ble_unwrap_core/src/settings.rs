@@ -129,7 +129,7 @@ impl Settings {
         let t = &self.stretch;
         let positive = "a positive number";
         let unit = "between 0 and 1";
-        let checks: [(&'static str, f64, bool, &'static str); 15] = [
+        let checks: [(&'static str, f64, bool, &'static str); 16] = [
             (
                 "stretch_limit",
                 self.stretch_limit,
@@ -148,7 +148,13 @@ impl Settings {
             ("first_parts", s.first_parts as f64, s.first_parts >= 2, "at least 2"),
             ("later_parts", s.later_parts as f64, s.later_parts >= 2, "at least 2"),
             ("band", s.band, (0.0..=1.0).contains(&s.band), unit),
-            ("crease_weight", s.crease_weight, (0.0..=1.0).contains(&s.crease_weight), unit),
+            ("crease_share", s.crease_share, (0.0..=1.0).contains(&s.crease_share), unit),
+            (
+                "crease_weight",
+                s.crease_weight,
+                (0.0..=SegmentationSettings::MOST_CREASE_WEIGHT).contains(&s.crease_weight),
+                "between 0 and 100",
+            ),
             (
                 "kernel_width",
                 e.kernel_width.unwrap_or(1.0),

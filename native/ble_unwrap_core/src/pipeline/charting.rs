@@ -192,7 +192,7 @@ impl<'a> Attempt<'a> {
         if self.topology.is_disk() || blob || patch.faces.len() < LEAST_FACES_TO_CUT {
             return Ok(None);
         }
-        let length = |h| patch.mesh.edge_length(h);
+        let length = |h| patch.mesh.edge_length(h) * patch.mesh.border_cost(h);
         let diagonal = |h| patch.is_diagonal(h);
         if self.topology.genus() > 0 && self.settings.holes == Holes::Keep {
             let open = patch.cut(&charts::cut_open(&patch.mesh, length, diagonal));

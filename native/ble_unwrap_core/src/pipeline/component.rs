@@ -171,7 +171,8 @@ impl<'a> OnCoarse<'a> {
         let under = |f: &FaceId| chart_of[self.coarse.face[f.index()].index()];
         let mut label: Vec<u32> = patch.faces.iter().map(under).collect();
         spread_labels(&patch.mesh, &mut label);
-        let parts = segmentation::straighten(&patch.mesh, &patch.polygon, &label, BAND_RINGS, progress)?;
+        let crease_weight = self.settings.segmentation.crease_weight;
+        let parts = segmentation::straighten(&patch.mesh, &patch.polygon, &label, BAND_RINGS, crease_weight, progress)?;
         let guide_of = |part: &Patch| {
             let mut votes = vec![0usize; charts.len()];
             part.faces.iter().map(under).filter(|n| *n != NONE).for_each(|n| votes[n as usize] += 1);

@@ -12,16 +12,19 @@ const UNIT: f64 = 65536.0;
 pub(super) struct Bends {
     first: Vec<usize>,
     bend: Vec<f64>,
+    /// What a border costs on a side besides: less on a guide.
+    guidance: Vec<f64>,
     mean_bend: f64,
+    crease_weight: f64,
     /// Mean length of a side, above 0.
     pub(super) mean_length: f64,
 }
 
 impl Bends {
-    pub(super) fn new(mesh: &TriMesh, graph: &PolygonGraph) -> Self {
+    pub(super) fn new(mesh: &TriMesh, graph: &PolygonGraph, crease_weight: f64) -> Self {
         let normals = measure::face_normals(mesh);
         let mut first = Vec::with_capacity(graph.len());
-        let mut bend = Vec::new();
+        let (mut bend, mut guidance) = (Vec::new(), Vec::new());
         let (mut sum_bend, mut sum_length) = (0.0, 0.0);
         for links in graph.links.iter() {
             first.push(bend.len());
@@ -31,16 +34,26 @@ impl Bends {
                 sum_bend += d * link.length;
                 sum_length += link.length;
                 bend.push(d);
+                guidance.push(mesh.border_cost(link.halfedge));
             }
         }
         let mean = |sum: f64, n: f64| if n > 0.0 { sum / n } else { 0.0 };
         let mean_bend = mean(sum_bend, sum_length).max(f64::MIN_POSITIVE);
-        Self { first, mean_bend, mean_length: mean(sum_length, bend.len() as f64).max(f64::MIN_POSITIVE), bend }
+        let mean_length = mean(sum_length, bend.len() as f64).max(f64::MIN_POSITIVE);
+        Self { first, bend, guidance, mean_bend, crease_weight, mean_length }
     }
 
-    /// Cost of cutting along side `k` of polygon `p`: 1 where the surface is flat, near 0 at a crease.
-    pub(super) fn crease(&self, p: usize, k: usize) -> f64 {
-        1.0 / (1.0 + self.bend[self.first[p] + k] / self.mean_bend)
+    /// Cost of a border of unit length along side `k` of polygon `p`: 1 where the surface is flat, near 0 at a crease,
+    /// and on guides a share of that.
+    pub(super) fn cost(&self, p: usize, k: usize) -> f64 {
+        self.cost_with_fit(p, k, 1.0, 0.0)
+    }
+
+    /// The same with a share of `misfit` in it (mean 1), and of the crease only `crease_share`.
+    pub(super) fn cost_with_fit(&self, p: usize, k: usize, crease_share: f64, misfit: f64) -> f64 {
+        let side = self.first[p] + k;
+        let crease = 1.0 / (1.0 + self.crease_weight * self.bend[side] / self.mean_bend);
+        self.guidance[side] * (crease_share * crease + (1.0 - crease_share) * misfit)
     }
 }
 

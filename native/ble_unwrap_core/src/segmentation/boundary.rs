@@ -9,32 +9,32 @@ use crate::linalg::{Mds, classical_mds};
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
 
-use super::CutGraph;
 use super::bends::{Bends, capacity};
 use super::polygon_graph::PolygonGraph;
+use super::{CutGraph, SegmentationSettings};
 
-/// Moves the borders between parts. `crease_weight` is the α of the capacity
-/// α/(1 + d/mean) + (1 − α)·(gᵢ + gⱼ)/(2·mean), with d = 1 − cos(dihedral) and g the difference between
+/// Moves the borders between parts. `crease_share` is the α of the capacity
+/// α/(1 + w·d/mean) + (1 − α)·(gᵢ + gⱼ)/(2·mean), with w the crease weight, d = 1 − cos(dihedral) and g the difference between
 /// the errors of a polygon's distances in the two parts' own embeddings.
 pub(super) fn improve(
     mesh: &TriMesh,
     graph: &PolygonGraph,
     distances: &LandmarkDistances,
     representatives: &[usize],
-    band: f64,
-    crease_weight: f64,
+    settings: &SegmentationSettings,
+    crease_share: f64,
     label: &mut [u32],
     progress: &Progress,
 ) -> Result<(), Cancelled> {
-    let bends = Bends::new(mesh, graph);
+    let bends = Bends::new(mesh, graph, settings.crease_weight);
     let parts: Vec<Part> = (0..representatives.len())
-        .map(|r| Part::new(mesh, graph, distances, representatives, r, crease_weight < 1.0))
+        .map(|r| Part::new(mesh, graph, distances, representatives, r, crease_share < 1.0))
         .collect();
     for a in 0..parts.len() {
         for b in a + 1..parts.len() {
             progress.check()?;
             let pair = Pair { mesh, graph, distances, bends: &bends, number: [a, b], parts: [&parts[a], &parts[b]] };
-            pair.improve(band, crease_weight, label, progress)?;
+            pair.improve(settings.band, crease_share, label, progress)?;
         }
     }
     Ok(())
@@ -108,7 +108,7 @@ struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    fn improve(&self, band: f64, crease_weight: f64, label: &mut [u32], progress: &Progress) -> Result<(), Cancelled> {
+    fn improve(&self, band: f64, crease_share: f64, label: &mut [u32], progress: &Progress) -> Result<(), Cancelled> {
         let [a, b] = self.number.map(|n| u32::try_from(n).unwrap_or(0));
         // −1 at the first representative, 0 on the bisector, 1 at the second.
         let balance = |p: usize| {
@@ -127,7 +127,7 @@ impl Pair<'_> {
         for (i, &p) in nodes.iter().enumerate() {
             node[p] = i;
         }
-        let misfit: Vec<f64> = if crease_weight < 1.0 {
+        let misfit: Vec<f64> = if crease_share < 1.0 {
             nodes.iter().map(|&p| (self.parts[0].error(self, p) - self.parts[1].error(self, p)).abs()).collect()
         } else {
             vec![0.0; nodes.len()]
@@ -139,7 +139,7 @@ impl Pair<'_> {
                 let q = link.to as usize;
                 let other = if node[q] == usize::MAX { misfit[i] } else { misfit[node[q]] };
                 let fit = (misfit[i] + other) / (2.0 * mean_misfit);
-                let cost = crease_weight * self.bends.crease(p, k) + (1.0 - crease_weight) * fit;
+                let cost = self.bends.cost_with_fit(p, k, crease_share, fit);
                 let capacity = capacity(cost * link.length / self.bends.mean_length);
                 if node[q] != usize::MAX {
                     if p < q {
