@@ -1,7 +1,8 @@
 //! What the settings and marks of the user do to whole atlases.
 
-use ble_unwrap_core::{Atlas, MeshInput, Progress, Settings, unwrap};
-use ble_unwrap_fixtures::{FlatPolygons, PolyMesh, uv_sphere};
+use ble_unwrap_core::{Analysis, Atlas, LimitOver, MeshInput, Progress, Settings, UnwrapError, unwrap};
+use ble_unwrap_fixtures::{FlatPolygons, PolyMesh, many_components, sculpt_like, uv_sphere};
+use rayon::ThreadPoolBuilder;
 
 fn input<'a>(mesh: &'a PolyMesh, flat: &'a FlatPolygons) -> MeshInput<'a> {
     MeshInput {
@@ -56,4 +57,94 @@ fn borders_follow_guides_on_small_and_on_large_meshes() {
         assert!(10 * with >= 9 * around, "{with} of {around} sides of the circle are borders");
         assert!(2 * without < with, "without guides it is no place for a border: {without}");
     }
+}
+
+/// Everything but the seconds, bit for bit.
+fn bytes(atlas: &Atlas) -> (Vec<[u32; 2]>, Vec<i32>, String) {
+    let mut report = atlas.report.clone();
+    report.seconds.clear();
+    (atlas.uv.iter().map(|uv| uv.map(f32::to_bits)).collect(), atlas.chart.clone(), format!("{report:?}"))
+}
+
+#[test]
+fn a_limit_over_the_atlas_is_spent_on_fewer_charts_and_kept() {
+    let (mut before, mut after, mut single) = (0, 0, 0);
+    for (mesh, stretch_limit) in [(uv_sphere(24, 16), 1.05), (sculpt_like(2_000), 1.03), (many_components(4), 1.02)] {
+        let flat = mesh.flat();
+        let charts = Settings { stretch_limit, ..Settings::default() };
+        let all = Settings { limit_over: LimitOver::Atlas, ..charts.clone() };
+        let run = |settings, threads| {
+            let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            pool.install(|| unwrap(&input(&mesh, &flat), settings, &Progress::new())).expect("unwraps")
+        };
+        let (one, two) = (run(&charts, 2).report, run(&all, 2));
+        assert_eq!(bytes(&two), bytes(&run(&all, 1)), "threads change nothing");
+        let report = two.report;
+        assert_eq!((one.chart_limit, one.atlas_limit), (stretch_limit, None));
+        assert_eq!((report.chart_limit, report.atlas_limit), (all.chart_limit(), Some(stretch_limit)));
+        assert!(report.charts_over_limit.is_empty() && report.warnings.is_empty(), "{:?}", report.warnings);
+        assert!(report.l2 <= stretch_limit && report.l2_worst_chart <= report.chart_limit, "{report:?}");
+        assert_eq!((report.flips, report.overlaps), (0, 0));
+        before += one.charts;
+        after += report.charts;
+        single += usize::from(report.l2_worst_chart > stretch_limit);
+    }
+    assert!(10 * after <= 9 * before, "{before} charts became {after}");
+    assert!(single > 0, "no chart has more than the limit: the room was not used");
+}
+
+#[test]
+fn an_analysis_gives_what_unwrap_gives_whatever_came_before() {
+    for mesh in [sculpt_like(2_000), uv_sphere(100, 50)] {
+        let flat = mesh.flat();
+        let analysis = Analysis::new(&input(&mesh, &flat), false, &Progress::new()).expect("a mesh");
+        assert_eq!(analysis.face_count(), mesh.faces.len());
+        let limit = |stretch_limit| Settings { stretch_limit, ..Settings::default() };
+        let calls = [
+            limit(1.1),
+            limit(1.02),
+            limit(1.1),
+            limit(1.3),
+            Settings { seed: 3, ..limit(1.05) },
+            Settings { limit_over: LimitOver::Atlas, ..limit(1.05) },
+            Settings { stretch_limit: 1.02, ..Settings::iso_charts() },
+            limit(1.05),
+        ];
+        for settings in &calls {
+            let fresh = unwrap(&input(&mesh, &flat), settings, &Progress::new()).expect("unwraps");
+            let again = analysis.unwrap(settings, &Progress::new()).expect("unwraps");
+            assert!(bytes(&fresh) == bytes(&again), "limit {}", settings.stretch_limit);
+        }
+        // From several threads at once, and after one that was cancelled.
+        let fresh: Vec<_> =
+            calls[..4].iter().map(|s| bytes(&analysis.unwrap(s, &Progress::new()).expect("unwraps"))).collect();
+        let other = Analysis::new(&input(&mesh, &flat), false, &Progress::new()).expect("a mesh");
+        let stopped = Progress::new();
+        stopped.cancel();
+        assert!(matches!(other.unwrap(&calls[0], &stopped), Err(UnwrapError::Cancelled(_))));
+        std::thread::scope(|scope| {
+            let run = |s| bytes(&other.unwrap(s, &Progress::new()).expect("unwraps"));
+            let run = &run;
+            let threads: Vec<_> = calls[..4].iter().map(|s| scope.spawn(move || run(s))).collect();
+            for (thread, expected) in threads.into_iter().zip(&fresh) {
+                assert!(thread.join().expect("no panic") == *expected);
+            }
+        });
+    }
+}
+
+#[test]
+fn an_analysis_refuses_what_it_was_not_made_for() {
+    let mesh = uv_sphere(12, 8);
+    let flat = mesh.flat();
+    let mut wrong = input(&mesh, &flat);
+    wrong.guides = &[[0, 1], [2, 10_000]];
+    let error = Analysis::new(&wrong, false, &Progress::new()).expect_err("no such vertex");
+    assert!(error.to_string().contains("guide 1 names vertex 10000"), "{error}");
+    let analysis = Analysis::new(&input(&mesh, &flat), true, &Progress::new()).expect("a mesh");
+    let error = analysis.unwrap(&Settings::default(), &Progress::new()).expect_err("not welded");
+    assert!(matches!(error, UnwrapError::Setting { name: "weld", .. }), "{error}");
+    let welded = Settings { weld: true, ..Settings::default() };
+    assert!(analysis.unwrap(&Settings { stretch_limit: 0.5, ..welded.clone() }, &Progress::new()).is_err());
+    assert!(analysis.unwrap(&welded, &Progress::new()).is_ok());
 }

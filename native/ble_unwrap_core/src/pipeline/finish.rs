@@ -14,7 +14,7 @@ use crate::progress::{Cancelled, Progress, Stage};
 use crate::report::Report;
 use crate::rounding::{self, Rounding};
 use crate::segmentation;
-use crate::settings::{ChartScale, Settings};
+use crate::settings::{ChartScale, LimitOver, Settings};
 use crate::verify::{self, Certificate};
 
 use super::rungs::{Rung, Rungs};
@@ -64,7 +64,7 @@ pub(super) fn finish(
         if (faulty.is_empty() && layout.broken.is_empty()) || round == MOST_ROUNDS {
             let measures = metrics::measure(&mesh, progress)?;
             clock.lap("verify");
-            let mut report = Report::new(&measures, settings.stretch_limit);
+            let mut report = Report::new(&measures, settings.chart_limit());
             report.faces = input.face_offsets.len().saturating_sub(1);
             report.unmapped_faces = surface.unmapped.len();
             report.warnings = warnings(surface, &layout, &certificate);
@@ -73,6 +73,13 @@ pub(super) fn finish(
                     "{} charts exceed the stretch limit, the worst is chart {chart} with {l2:.3}",
                     report.charts_over_limit.len()
                 ));
+            }
+            if settings.limit_over == LimitOver::Atlas {
+                report.atlas_limit = Some(settings.stretch_limit);
+                if report.l2_chart_scale > settings.stretch_limit {
+                    let (l2, limit) = (report.l2_chart_scale, settings.stretch_limit);
+                    report.warnings.push(format!("the atlas has a stretch of {l2:.3}, above the limit of {limit}"));
+                }
             }
             report.rungs = rungs.taken();
             report.seconds = clock.laps;

@@ -52,7 +52,7 @@ impl Bends {
     /// The same with a share of `misfit` in it (mean 1), and of the crease only `crease_share`.
     pub(super) fn cost_with_fit(&self, p: usize, k: usize, crease_share: f64, misfit: f64) -> f64 {
         let side = self.first[p] + k;
-        let crease = 1.0 / (1.0 + self.crease_weight * self.bend[side] / self.mean_bend);
+        let crease = (1.0 + self.bend[side] / self.mean_bend).powf(-self.crease_weight);
         self.guidance[side] * (crease_share * crease + (1.0 - crease_share) * misfit)
     }
 }

@@ -14,7 +14,7 @@ use super::polygon_graph::PolygonGraph;
 use super::{CutGraph, SegmentationSettings};
 
 /// Moves the borders between parts. `crease_share` is the α of the capacity
-/// α/(1 + w·d/mean) + (1 − α)·(gᵢ + gⱼ)/(2·mean), with w the crease weight, d = 1 − cos(dihedral) and g the difference between
+/// α/(1 + d/mean)ʷ + (1 − α)·(gᵢ + gⱼ)/(2·mean), with w the crease weight, d = 1 − cos(dihedral) and g the difference between
 /// the errors of a polygon's distances in the two parts' own embeddings.
 pub(super) fn improve(
     mesh: &TriMesh,

@@ -1,5 +1,7 @@
 //! Regions between guides.
 
+use std::collections::VecDeque;
+
 use crate::mesh::TriMesh;
 
 use super::polygon_graph::PolygonGraph;
@@ -8,11 +10,11 @@ use super::polygon_graph::PolygonGraph;
 const LEAST_SHARE: f64 = 0.1;
 
 /// Where guides divide the surface into regions, gives each region the label of most of its area, so that the borders
-/// between labels run along guides. Changes nothing where that would leave a label with next to nothing, nor without
-/// guides. O(n).
-pub(super) fn snap(mesh: &TriMesh, graph: &PolygonGraph, label: &mut [u32]) {
+/// between labels run along guides. Where that would leave a label with next to nothing, but guides divide the surface
+/// into some large regions, those become the parts; returns whether that was so. Else changes nothing. O(n).
+pub(super) fn snap(mesh: &TriMesh, graph: &PolygonGraph, label: &mut Vec<u32>) -> bool {
     if !mesh.has_guides() {
-        return;
+        return false;
     }
     let (region, regions) = regions(mesh, graph);
     let labels = label.iter().max().map_or(0, |most| *most as usize + 1);
@@ -21,16 +23,42 @@ pub(super) fn snap(mesh: &TriMesh, graph: &PolygonGraph, label: &mut [u32]) {
         share[region[p] as usize * labels + label[p] as usize] += area;
     }
     let mut kept = vec![0.0; labels];
-    let mut most_of = Vec::with_capacity(regions);
+    let (mut most_of, mut size) = (Vec::with_capacity(regions), Vec::with_capacity(regions));
     for shares in share.chunks_exact(labels.max(1)) {
         let most = (0..labels).fold(0, |best, l| if shares[l] > shares[best] { l } else { best });
-        kept[most] += shares.iter().sum::<f64>();
+        let area: f64 = shares.iter().sum();
+        kept[most] += area;
         most_of.push(most as u32);
+        size.push(area);
     }
-    let total: f64 = graph.area.iter().sum();
-    if kept.iter().all(|area| *area >= LEAST_SHARE * total) {
+    let least = LEAST_SHARE * graph.area.iter().sum::<f64>();
+    if kept.iter().all(|area| *area >= least) {
         label.iter_mut().zip(&region).for_each(|(l, r)| *l = most_of[*r as usize]);
+        return false;
     }
+    let large: Vec<bool> = size.iter().map(|area| *area >= least).collect();
+    if large.iter().filter(|large| **large).count() < 2 {
+        return false;
+    }
+    *label = grown(graph, &region, &large);
+    true
+}
+
+/// The large region that each polygon is in or, of those in small ones, reached from first.
+fn grown(graph: &PolygonGraph, region: &[u32], large: &[bool]) -> Vec<u32> {
+    let mut label = vec![u32::MAX; graph.len()];
+    let mut queue: VecDeque<usize> = (0..graph.len()).filter(|&p| large[region[p] as usize]).collect();
+    queue.iter().for_each(|&p| label[p] = region[p]);
+    while let Some(p) = queue.pop_front() {
+        for link in graph.links.group(p) {
+            let q = link.to as usize;
+            if label[q] == u32::MAX {
+                label[q] = label[p];
+                queue.push_back(q);
+            }
+        }
+    }
+    label
 }
 
 /// The region of each polygon, numbered by first polygon, and how many there are.
@@ -82,6 +110,10 @@ mod tests {
         };
         assert_eq!(snapped(&[0.3]), (0..100).map(|p| u32::from(p % 10 >= 3)).collect::<Vec<_>>());
         assert_eq!(snapped(&[0.2, 0.7]), (0..100).map(|p| u32::from(p % 10 >= 7)).collect::<Vec<_>>());
+        // All of it would go to one label: the regions are the parts then.
+        let mut label: Vec<u32> = (0..100).map(|p| u32::from(p % 10 == 9)).collect();
+        assert!(snap(&guided(&[0.4]), &graph, &mut label));
+        assert_eq!(label, (0..100).map(|p| u32::from(p % 10 >= 4)).collect::<Vec<_>>());
         assert_eq!(snapped(&[]), halves, "no guides");
         assert_eq!(snapped(&[0.0]), halves, "guides that divide nothing");
     }

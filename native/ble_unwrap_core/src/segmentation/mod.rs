@@ -7,7 +7,7 @@
 //!    the patch needs, and how well two would do.
 //! 2. Representatives: landmarks at the ends of the leading dimensions, spread apart.
 //! 3. Growth: every polygon goes to the nearest representative by geodesic distance.
-//!    Where guides divide the patch, whole regions between guides go where most of them went.
+//!    Where guides divide the patch, whole regions between guides go where most of them went, or become the parts.
 //! 4. Boundaries: a minimum cut in a band around each border, drawn to creases and to short lines.
 //! 5. Repair: parts become connected, fragments go to a neighbour.
 //!
@@ -46,14 +46,14 @@ pub struct SegmentationSettings {
     pub band: f64,
     /// Share of length and creases in the cut's cost after the first split, 0 to 1; the rest looks at embedding errors.
     pub crease_share: f64,
-    /// How strongly borders are drawn to creases: 0 not at all, 1 as iso-charts has it. A border along a side that bends
-    /// as much as the mean costs 1/(1 + `crease_weight`) of one in a plane.
+    /// How strongly borders are drawn to creases, 0 to 2: 0 not at all, 1 as iso-charts has it. A border along a side that
+    /// bends as much as the mean costs ½ to this power of one in a plane.
     pub crease_weight: f64,
 }
 
 impl SegmentationSettings {
-    /// Most that creases may count for: a right angle then costs what rounding leaves of it.
-    pub const MOST_CREASE_WEIGHT: f64 = 100.0;
+    /// The largest [`crease_weight`](Self::crease_weight): beyond, folds cost less than the least capacity.
+    pub const MOST_CREASE_WEIGHT: f64 = 2.0;
 }
 
 impl Default for SegmentationSettings {
@@ -94,7 +94,9 @@ pub fn segment(
     let area: f64 = graph.area.iter().sum();
     let representatives = grow::representatives(distances, analysis, area, most.min(2 * analysis.dimension));
     let mut label = grow::nearest(mesh, &graph, distances, &representatives);
-    guides::snap(mesh, &graph, &mut label);
+    if guides::snap(mesh, &graph, &mut label) {
+        return Ok(finish(&graph, label));
+    }
     let crease_share = if first { 1.0 } else { settings.crease_share };
     boundary::improve(mesh, &graph, distances, &representatives, settings, crease_share, &mut label, progress)?;
     Ok(finish(&graph, label))

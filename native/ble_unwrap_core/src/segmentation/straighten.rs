@@ -188,7 +188,7 @@ mod tests {
             let border = border(&mesh, label);
             border.len() == 20 && border.iter().all(|h| at_fold(h) && mesh.position(mesh.from(*h)).z.abs() < 1e-9)
         };
-        assert!(on_fold(&run(1.0).label) && on_fold(&run(100.0).label));
+        assert!(on_fold(&run(1.0).label) && on_fold(&run(2.0).label));
         assert!(!on_fold(&run(0.0).label), "where folds count nothing, every column is as good");
     }
 

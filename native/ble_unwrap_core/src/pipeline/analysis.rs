@@ -1,0 +1,125 @@
+//! A mesh made ready to be unwrapped again and again.
+
+use rayon::prelude::*;
+
+use crate::charts::{Chart, Patch};
+use crate::error::UnwrapError;
+use crate::mesh::{self, ConditionOptions, MeshInput, Surface};
+use crate::progress::{Cancelled, Progress, Stage};
+use crate::settings::{LimitOver, Settings};
+
+use super::rungs::Rungs;
+use super::tally::Tally;
+use super::{Atlas, Clock, budget, component, finish};
+
+/// A mesh and what was found out about it, for unwrapping it several times with different settings.
+///
+/// Guaranteed: [`Analysis::unwrap`] gives what [`unwrap`](crate::unwrap()) gives with the same mesh and settings, bit for
+/// bit (times apart), whatever was unwrapped before and by how many threads at once.
+///
+/// Not guaranteed: that a second call is faster, as it will be if little but the limit differs.
+#[derive(Debug)]
+pub struct Analysis {
+    positions: Vec<[f64; 3]>,
+    corner_vertices: Vec<i32>,
+    face_offsets: Vec<i32>,
+    weld: bool,
+    prepared: Prepared,
+}
+
+impl Analysis {
+    /// Copies the mesh and conditions it; `weld` as in [`Settings`]. O(n log n).
+    ///
+    /// # Errors
+    /// [`UnwrapError::Mesh`] if the arrays do not make a mesh; cancelled.
+    pub fn new(input: &MeshInput<'_>, weld: bool, progress: &Progress) -> Result<Self, UnwrapError> {
+        progress.check()?;
+        progress.enter(Stage::Condition);
+        Ok(Self {
+            prepared: Prepared::new(input, weld, progress)?,
+            positions: input.positions.to_vec(),
+            corner_vertices: input.corner_vertices.to_vec(),
+            face_offsets: input.face_offsets.to_vec(),
+            weld,
+        })
+    }
+
+    /// Whether vertices at the same position count as one.
+    #[must_use]
+    pub fn weld(&self) -> bool {
+        self.weld
+    }
+
+    /// Number of faces of the mesh.
+    #[must_use]
+    pub fn face_count(&self) -> usize {
+        self.face_offsets.len().saturating_sub(1)
+    }
+
+    /// As [`unwrap`](crate::unwrap()) of the mesh.
+    ///
+    /// # Errors
+    /// As there; also if `settings.weld` is not what the mesh was analysed with.
+    pub fn unwrap(&self, settings: &Settings, progress: &Progress) -> Result<Atlas, UnwrapError> {
+        progress.check()?;
+        settings.validate()?;
+        if settings.weld != self.weld {
+            let value = settings.weld.to_string();
+            let allowed = if self.weld { "true, as in the analysis" } else { "false, as in the analysis" };
+            return Err(UnwrapError::Setting { name: "weld", value, allowed });
+        }
+        let input = MeshInput {
+            positions: &self.positions,
+            corner_vertices: &self.corner_vertices,
+            face_offsets: &self.face_offsets,
+            ..MeshInput::default()
+        };
+        self.prepared.unwrap(&input, settings, Clock::new(), progress)
+    }
+}
+
+/// The surface of a mesh in connected pieces.
+#[derive(Debug)]
+pub(super) struct Prepared {
+    surface: Surface,
+    patches: Vec<Patch>,
+}
+
+impl Prepared {
+    pub(super) fn new(input: &MeshInput<'_>, weld: bool, progress: &Progress) -> Result<Self, UnwrapError> {
+        let surface = mesh::condition(input, &ConditionOptions { weld }, progress)?;
+        let patches = Patch::components(&surface.mesh, &surface.polygon);
+        Ok(Self { surface, patches })
+    }
+
+    /// The stages after conditioning. Of `input` only positions, corners and offsets are looked at.
+    pub(super) fn unwrap(
+        &self,
+        input: &MeshInput<'_>,
+        settings: &Settings,
+        mut clock: Clock,
+        progress: &Progress,
+    ) -> Result<Atlas, UnwrapError> {
+        progress.enter(Stage::Charts);
+        let (surface, patches) = (&self.surface, &self.patches);
+        let tally = Tally::new(progress, surface.mesh.face_count());
+        let made: Vec<Result<(Vec<Chart>, Rungs), Cancelled>> = patches
+            .par_iter()
+            .with_max_len(1)
+            .map(|patch| component::charts(patch, settings, &tally, progress))
+            .collect();
+        let (mut charts, mut rungs) = (Vec::new(), Rungs::default());
+        for component in made {
+            let (more, steps) = component?;
+            charts.extend(more);
+            rungs.add(&steps);
+        }
+        if settings.limit_over == LimitOver::Atlas && settings.merge {
+            let (joined, steps) = budget::spend(&surface.mesh, &surface.polygon, charts, settings, progress)?;
+            charts = joined;
+            rungs.add(&steps);
+        }
+        clock.lap("charts");
+        finish::finish(input, surface, charts, rungs, settings, clock, progress)
+    }
+}
