@@ -43,17 +43,11 @@ impl Bends {
         Self { first, bend, guidance, mean_bend, crease_weight, mean_length }
     }
 
-    /// Cost of a border of unit length along side `k` of polygon `p`: 1 where the surface is flat, near 0 at a crease,
-    /// and on guides a share of that.
-    pub(super) fn cost(&self, p: usize, k: usize) -> f64 {
-        self.cost_with_fit(p, k, 1.0, 0.0)
-    }
-
-    /// The same with a share of `misfit` in it (mean 1), and of the crease only `crease_share`.
-    pub(super) fn cost_with_fit(&self, p: usize, k: usize, crease_share: f64, misfit: f64) -> f64 {
+    /// Cost of cutting along side `k` of polygon `p`: 1 where the surface is flat, near 0 at a crease, and on a guide a
+    /// share of that. With w the crease weight: 1/(1 + d/mean)ʷ.
+    pub(super) fn crease(&self, p: usize, k: usize) -> f64 {
         let side = self.first[p] + k;
-        let crease = (1.0 + self.bend[side] / self.mean_bend).powf(-self.crease_weight);
-        self.guidance[side] * (crease_share * crease + (1.0 - crease_share) * misfit)
+        self.guidance[side] * (1.0 + self.bend[side] / self.mean_bend).powf(-self.crease_weight)
     }
 }
 

@@ -139,7 +139,7 @@ impl Pair<'_> {
                 let q = link.to as usize;
                 let other = if node[q] == usize::MAX { misfit[i] } else { misfit[node[q]] };
                 let fit = (misfit[i] + other) / (2.0 * mean_misfit);
-                let cost = self.bends.cost_with_fit(p, k, crease_share, fit);
+                let cost = crease_share * self.bends.crease(p, k) + (1.0 - crease_share) * fit;
                 let capacity = capacity(cost * link.length / self.bends.mean_length);
                 if node[q] != usize::MAX {
                     if p < q {

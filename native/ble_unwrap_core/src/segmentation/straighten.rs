@@ -97,7 +97,7 @@ impl Band {
         for (i, &p) in self.order.iter().enumerate() {
             for (k, link) in graph.links.group(p).iter().enumerate() {
                 let q = link.to as usize;
-                let capacity = capacity(bends.cost(p, k) * link.length / bends.mean_length);
+                let capacity = capacity(bends.crease(p, k) * link.length / bends.mean_length);
                 if self.node[q] != usize::MAX {
                     if p < q {
                         cut.add_edge(i, self.node[q], capacity);

@@ -255,7 +255,7 @@ mod tests {
     #[test]
     fn first_contact_is_when_the_ends_meet() {
         let (mesh, uv) = horseshoe(0.3);
-        let barrier = Barrier::new(&mesh, &RestTriangle::of_mesh(&mesh));
+        let barrier = Barrier::new(&mesh, &RestTriangle::of_mesh(&mesh), BOUNDARY_REACH);
         // The end column moves straight at the fixed first column, which lies on y = 0 between x = 6
         // and 7: the first to touch is the vertex (6, 0).
         let last: Vec<usize> = mesh.vertices().map(|v| v.index()).filter(|&v| mesh.positions()[v].x > 39.5).collect();

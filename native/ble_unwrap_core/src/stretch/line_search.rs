@@ -209,7 +209,7 @@ mod tests {
     use super::*;
     use crate::stretch::overlap::first_flip;
     use crate::stretch::test_meshes::hemisphere;
-    use crate::stretch::{TutteBoundary, l2_stretch, minimise_stretch, tutte_embedding};
+    use crate::stretch::{BOUNDARY_REACH, TutteBoundary, l2_stretch, minimise_stretch, tutte_embedding};
 
     #[test]
     fn every_sweep_lowers_the_stretch_and_flips_nothing() {

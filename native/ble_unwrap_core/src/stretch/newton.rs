@@ -214,7 +214,7 @@ pub(super) fn rescale(
 mod tests {
     use super::*;
     use crate::stretch::test_meshes::{annulus, grid, hemisphere};
-    use crate::stretch::{TutteBoundary, l2_stretch, minimise_stretch, tutte_embedding};
+    use crate::stretch::{BOUNDARY_REACH, TutteBoundary, l2_stretch, minimise_stretch, tutte_embedding};
     use nalgebra::Point3;
 
     fn tutte(mesh: &TriMesh, rest: &[RestTriangle]) -> Vec<Point2<f64>> {
@@ -321,7 +321,7 @@ mod tests {
         assert!(boundary_is_simple(&mesh, &start));
         let free = run(&mesh, &start, 1e-4, MinimiseOptions::default());
         assert!(!boundary_is_simple(&mesh, &free.uv), "the free ramp does not overlap: no test");
-        let kept = run(&mesh, &start, 1e-4, MinimiseOptions { keep_boundary_simple: true, ..Default::default() });
+        let kept = run(&mesh, &start, 1e-4, MinimiseOptions { keep_apart: Some(BOUNDARY_REACH), ..Default::default() });
         assert!(boundary_is_simple(&mesh, &kept.uv));
         assert!(kept.l2 < 1.5 && kept.l2 > free.l2, "{} {}", kept.l2, free.l2);
     }
@@ -330,7 +330,8 @@ mod tests {
     fn bad_starts_are_refused() {
         let mesh = ramp();
         let rest = RestTriangle::of_mesh(&mesh);
-        let go = |start: &[Point2<f64>], keep_boundary_simple: bool, progress: &Progress| {
+        let go = |start: &[Point2<f64>], apart: bool, progress: &Progress| {
+            let keep_apart = apart.then_some(BOUNDARY_REACH);
             let options = MinimiseOptions { keep_apart, ..Default::default() };
             minimise_stretch(&mesh, &rest, start, &StretchSettings::default(), &options, progress)
         };
