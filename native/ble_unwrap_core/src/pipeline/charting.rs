@@ -1,12 +1,13 @@
 //! Surface to charts: flatten a patch, accept the chart or split the patch, until all are charts.
 
 use std::cell::OnceCell;
+use std::collections::HashMap;
 
 use rayon::prelude::*;
 
 use crate::charts::{self, Chart, Patch};
 use crate::geodesics::{self, LandmarkDistances};
-use crate::mesh::Topology;
+use crate::mesh::{Topology, VertexId};
 use crate::progress::{Cancelled, Progress};
 use crate::segmentation::{self, SpectralAnalysis};
 use crate::settings::{Holes, Settings};
@@ -35,11 +36,13 @@ struct Piece {
     patch: Patch,
     splits: u32,
     family: Option<u32>,
+    /// Distances taken over from the patch it was split from.
+    inherited: Option<LandmarkDistances>,
 }
 
 enum Step {
     Accept(Box<Chart>),
-    Split(Vec<Patch>),
+    Split(Vec<(Patch, Option<LandmarkDistances>)>),
 }
 
 /// Cuts and flattens patches until every chart is under the limit. Rounds over all open pieces, in
@@ -52,7 +55,8 @@ pub(super) fn chart(
     done: &(dyn Fn(f64) + Sync),
     progress: &Progress,
 ) -> Result<Charting, Cancelled> {
-    let mut open: Vec<Piece> = patches.into_iter().map(|patch| Piece { patch, splits: 0, family: None }).collect();
+    let whole = |patch| Piece { patch, splits: 0, family: None, inherited: None };
+    let mut open: Vec<Piece> = patches.into_iter().map(whole).collect();
     let mut accepted: Vec<(Chart, Option<u32>)> = Vec::new();
     let mut rungs = Rungs::default();
     let mut split_count = 0;
@@ -78,10 +82,11 @@ pub(super) fn chart(
                 Step::Accept(chart) => {
                     accepted.push((*chart, piece.family));
                 }
-                Step::Split(patches) => {
-                    let family = (patches.len() == 2).then_some(split_count);
+                Step::Split(parts) => {
+                    let family = (parts.len() == 2).then_some(split_count);
                     split_count += 1;
-                    next.extend(patches.into_iter().map(|patch| Piece { patch, splits: piece.splits + 1, family }));
+                    let splits = piece.splits + 1;
+                    next.extend(parts.into_iter().map(|(patch, inherited)| Piece { patch, splits, family, inherited }));
                 }
             }
         }
@@ -92,22 +97,11 @@ pub(super) fn chart(
     Ok(Charting { charts, family, rungs })
 }
 
-/// Flattens a patch as it is or with the cuts its topology needs; `None` where no such chart would be
-/// under the limit.
-pub(super) fn try_chart(
-    patch: &Patch,
-    settings: &Settings,
-    rungs: &mut Rungs,
-    progress: &Progress,
-) -> Result<Option<Chart>, Cancelled> {
-    Attempt::new(patch, settings, progress).run(rungs)
-}
-
 fn step(piece: &Piece, settings: &Settings, progress: &Progress) -> Result<(Step, Rungs), Cancelled> {
     progress.check()?;
     let (patch, splits) = (&piece.patch, piece.splits);
     let mut rungs = Rungs::default();
-    let attempt = Attempt::new(patch, settings, progress);
+    let attempt = Attempt::new(patch, piece.inherited.as_ref(), settings, progress);
     if patch.is_one_polygon() {
         let chart = attempt.polygon(&mut rungs)?;
         return Ok((Step::Accept(Box::new(chart)), rungs));
@@ -116,7 +110,8 @@ fn step(piece: &Piece, settings: &Settings, progress: &Progress) -> Result<(Step
         return Ok((Step::Accept(Box::new(chart)), rungs));
     }
     let parts = attempt.split(splits, &mut rungs)?;
-    Ok((Step::Split(parts), rungs))
+    let inherited: Vec<_> = parts.iter().map(|part| attempt.heritage(part)).collect();
+    Ok((Step::Split(parts.into_iter().zip(inherited).collect()), rungs))
 }
 
 /// The parts of a patch that is known not to be one chart, and that is not one polygon.
@@ -126,28 +121,37 @@ pub(super) fn split(
     rungs: &mut Rungs,
     progress: &Progress,
 ) -> Result<Vec<Patch>, Cancelled> {
-    Attempt::new(patch, settings, progress).split(1, rungs)
+    Attempt::new(patch, None, settings, progress).split(1, rungs)
 }
 
 /// One patch under trial: its topology, and its distances once somebody asks.
 struct Attempt<'a> {
     patch: &'a Patch,
     topology: Topology,
+    inherited: Option<&'a LandmarkDistances>,
     settings: &'a Settings,
     progress: &'a Progress,
     measured: OnceCell<(LandmarkDistances, SpectralAnalysis)>,
 }
 
 impl<'a> Attempt<'a> {
-    fn new(patch: &'a Patch, settings: &'a Settings, progress: &'a Progress) -> Self {
-        Self { patch, topology: patch.mesh.topology(), settings, progress, measured: OnceCell::new() }
+    fn new(
+        patch: &'a Patch,
+        inherited: Option<&'a LandmarkDistances>,
+        settings: &'a Settings,
+        progress: &'a Progress,
+    ) -> Self {
+        Self { patch, topology: patch.mesh.topology(), inherited, settings, progress, measured: OnceCell::new() }
     }
 
     fn analysis(&self) -> Result<&(LandmarkDistances, SpectralAnalysis), Cancelled> {
         if let Some(known) = self.measured.get() {
             return Ok(known);
         }
-        let fresh = analyse(self.patch, self.settings, self.progress)?;
+        let fresh = match self.inherited {
+            Some(distances) => (distances.clone(), SpectralAnalysis::new(distances)),
+            None => analyse(self.patch, self.settings, self.progress)?,
+        };
         Ok(self.measured.get_or_init(|| fresh))
     }
 
@@ -166,6 +170,22 @@ impl<'a> Attempt<'a> {
         Ok(patch.split(&parts.label, parts.parts))
     }
 
+    /// The distances that a part of this patch takes over, if it has enough of them.
+    fn heritage(&self, part: &Patch) -> Option<LandmarkDistances> {
+        let (distances, _) = self.measured.get()?;
+        let least = self.settings.geodesics.landmark_reuse_min;
+        if distances.len() < least {
+            return None;
+        }
+        let mut own: HashMap<VertexId, VertexId> = HashMap::with_capacity(self.patch.vertices.len());
+        for (i, v) in self.patch.vertices.iter().enumerate() {
+            own.entry(*v).or_insert(VertexId::new(i));
+        }
+        let vertices: Option<Vec<VertexId>> = part.vertices.iter().map(|v| own.get(v).copied()).collect();
+        let taken = distances.restricted(&vertices?);
+        (taken.len() >= least).then_some(taken)
+    }
+
     /// A chart whatever its stretch, for a patch that cannot be split.
     fn polygon(&self, rungs: &mut Rungs) -> Result<Chart, Cancelled> {
         let flat = match flatten::isometric(self.patch, rungs) {
@@ -182,8 +202,14 @@ impl<'a> Attempt<'a> {
             if let Some(flat) = flatten::isometric(patch, rungs) {
                 return Ok(Some(flat.into_chart(patch.clone())));
             }
-            let (distances, analysis) = self.analysis()?;
-            if let Some(flat) = self.flatten(patch, distances, analysis, rungs)? {
+            let flat = match flatten::projected(patch, self.settings, rungs, self.progress)? {
+                Some(verdict) => verdict,
+                None => {
+                    let (distances, analysis) = self.analysis()?;
+                    self.flatten(patch, distances, analysis, rungs)?
+                }
+            };
+            if let Some(flat) = flat {
                 return Ok(Some(flat.into_chart(patch.clone())));
             }
         }

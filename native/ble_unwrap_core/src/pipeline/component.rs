@@ -16,10 +16,10 @@ use crate::segmentation;
 use crate::settings::Settings;
 
 use super::charting::{self, Charting};
-use super::flatten::{self, Polished};
+use super::flatten;
 use super::merge::{self, Which};
 use super::prolong::{Prolonged, prolong};
-use super::rungs::Rungs;
+use super::rungs::{Rung, Rungs};
 use super::tally::Tally;
 
 /// Components of more vertices are charted on a coarse mesh.
@@ -28,7 +28,7 @@ const COARSE_ABOVE: usize = 3_000;
 const COARSE_SHARE: f64 = 0.05;
 /// and never fewer or more than these. Below, features of the size of a chart's width vanish; above, the trials
 /// cost more than the fine flattening.
-const COARSE_VERTICES: (usize, usize) = (1_500, 4_000);
+const COARSE_VERTICES: (usize, usize) = (1_500, 20_000);
 /// On the coarse mesh the stretch above 1 must stay under this share of what the limit allows: detail
 /// that the collapse removed adds some.
 const COARSE_ALLOWANCE: f64 = 0.6;
@@ -38,7 +38,7 @@ const BAND_RINGS: usize = 10;
 /// On the fine mesh only charts that a split there has made are joined again, and only up to so many faces: the
 /// others have been tried on the coarse mesh, and a trial costs what flattening them did. On a body with fingers
 /// and ears 1,200 instead of 6,000 saves a quarter of the time and costs 5 % more charts.
-const FINE_UNION: usize = 1_200;
+const FINE_UNION: usize = 20_000;
 /// A part that is over the limit is split on the coarse mesh only while it has more faces there than this, and
 const LEAST_COARSE_FACES: usize = 60;
 /// more than this on the fine mesh: below, charting it there costs no more.
@@ -238,24 +238,10 @@ impl<'a> OnCoarse<'a> {
 
     fn step(&self, part: &Part, rungs: &mut Rungs, progress: &Progress) -> Result<Outcome, Cancelled> {
         progress.check()?;
-        let mut guide = part.guide.clone();
-        for again in [false, true] {
-            if again {
-                guide = flatten::spread(&guide, self.settings, progress)?;
-            }
-            let Some(Prolonged { patch, start }) = prolong(&self.coarse, &guide, &part.patch) else {
-                return Ok(Outcome::Fine);
-            };
-            match flatten::polish(&patch, &start, self.settings, rungs, progress)? {
-                Polished::Chart(flat) => return Ok(Outcome::Accept(Box::new(flat.into_chart(patch)))),
-                Polished::Refused => break,
-                Polished::Overlaps if again => {
-                    if let Some(flat) = flatten::flatten_apart(&patch, self.settings, rungs, progress)? {
-                        return Ok(Outcome::Accept(Box::new(flat.into_chart(patch))));
-                    }
-                }
-                Polished::Overlaps => {}
-            }
+        if let Some(Prolonged { patch, start }) = prolong(&self.coarse, &part.guide, &part.patch)
+            && let Some(flat) = flatten::polish(&patch, &start, Rung::Prolonged, self.settings, rungs, progress)?
+        {
+            return Ok(Outcome::Accept(Box::new(flat.into_chart(patch))));
         }
         let mut faces = part.guide.patch.faces.clone();
         if faces.len() <= LEAST_COARSE_FACES || part.patch.faces.len() <= LEAST_FINE_FACES {

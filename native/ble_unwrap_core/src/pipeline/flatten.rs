@@ -32,8 +32,9 @@ const MOST_FOLDED: f64 = 0.25;
 /// A start without flips that is stretched more than this is not worth minimising: of the trials on a model
 /// with many holes, where starts are worst, none that began above 3 came under an L2 of 1.1; this leaves room.
 const HOPELESS_START: f64 = 4.0;
-/// See [`spread`]: in lengths of the coarse boundary's edges.
-const WIDE_REACH: f64 = 1.0;
+
+/// A patch whose faces all lean less than 70° from their mean normal is flattened from its projection.
+const MOST_LEANING: f64 = 70.0;
 
 /// A patch flattened without flips and without overlap.
 pub(super) struct Flat {
@@ -86,44 +87,45 @@ pub(super) fn flatten(
     recover(trial.flatten(distances, Some(settings.stretch_limit), rungs))
 }
 
-/// What became of a start near the minimum.
-pub(super) enum Polished {
-    Chart(Flat),
-    /// Under the limit but for an overlap of its boundary, which the start already had.
-    Overlaps,
-    Refused,
-}
-
-/// Flattens a patch of genus 0 with a boundary from a start in the plane near its minimum.
-pub(super) fn polish(
+/// Flattens a patch of genus 0 with a boundary from its projection, if it leans so little from its mean plane that this
+/// has no flip and no overlap. The outer `None` if it does not, the inner one where the limit is out of reach: another
+/// start would not help. Costs neither distances nor an embedding.
+pub(super) fn projected(
     patch: &Patch,
-    start: &[Point2<f64>],
     settings: &Settings,
     rungs: &mut Rungs,
     progress: &Progress,
-) -> Result<Polished, Cancelled> {
-    if let Some(flat) = isometric(patch, rungs) {
-        return Ok(Polished::Chart(flat));
+) -> Result<Option<Option<Flat>>, Cancelled> {
+    let Some(start) = embedding::project(&patch.mesh, MOST_LEANING) else { return Ok(None) };
+    if stretch::first_flip(&patch.mesh, &start).is_some() || !stretch::boundary_is_simple(&patch.mesh, &start) {
+        return Ok(None);
     }
-    let trial = Trial::new(patch, settings, progress);
-    match trial.polish(start, Some(settings.stretch_limit), Rung::Prolonged, rungs) {
-        Ok(polished) => Ok(polished),
+    match Trial::new(patch, settings, progress).free(&start, Some(settings.stretch_limit)) {
+        Ok(Free::Simple(flat)) => {
+            rungs.take(Rung::Projection);
+            Ok(Some(Some(flat)))
+        }
+        Ok(Free::Refused) => Ok(Some(None)),
         Err(StretchError::Cancelled(c)) => Err(c),
-        Err(_) => Ok(Polished::Refused),
+        Ok(Free::Overlaps) | Err(_) => Ok(None),
     }
 }
 
-/// A chart whose boundary keeps the length of its edges from itself, where it can: what is prolonged from it has room
-/// for the detours of the fine boundary. The chart as it was where that fails.
-pub(super) fn spread(chart: &Chart, settings: &Settings, progress: &Progress) -> Result<Chart, Cancelled> {
-    let patch = &chart.patch;
-    let trial = Trial::new(patch, settings, progress);
-    match trial.minimise(&chart.uv, None, Some(WIDE_REACH)) {
-        Ok(Some(spread)) => Ok(Chart { patch: patch.clone(), uv: spread.uv, l2: spread.l2 }),
-        Ok(None) => Ok(chart.clone()),
-        Err(StretchError::Cancelled(c)) => Err(c),
-        Err(_) => Ok(chart.clone()),
+/// Flattens a patch of genus 0 with a boundary from a start in the plane near its minimum, whose boundary is all but
+/// simple; `rung` is where the start comes from. `None` where the limit is out of reach or the boundary runs over itself.
+pub(super) fn polish(
+    patch: &Patch,
+    start: &[Point2<f64>],
+    rung: Rung,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Progress,
+) -> Result<Option<Flat>, Cancelled> {
+    if let Some(flat) = isometric(patch, rungs) {
+        return Ok(Some(flat));
     }
+    let trial = Trial::new(patch, settings, progress);
+    recover(trial.polish(start, settings.stretch_limit, rung, rungs))
 }
 
 /// Flattens a patch that is one polygon, which cannot be split: as well as it goes, and at worst on a
@@ -186,6 +188,14 @@ fn on_a_circle(patch: &Patch) -> Flat {
     Flat { l2: l2(patch, &RestTriangle::of_mesh(&patch.mesh), &uv), uv }
 }
 
+/// What became of a chart whose boundary was free.
+enum Free {
+    Simple(Flat),
+    /// Under the limit, but its boundary runs over itself.
+    Overlaps,
+    Refused,
+}
+
 /// The steps on one patch under a limit: the work stops as soon as that is out of reach.
 struct Trial<'a> {
     patch: &'a Patch,
@@ -206,56 +216,75 @@ impl<'a> Trial<'a> {
         rungs: &mut Rungs,
     ) -> Result<Option<Flat>, StretchError> {
         if let Some(start) = self.embed(distances)? {
-            match self.polish(&start, limit, Rung::Embedding, rungs)? {
-                Polished::Chart(flat) => return Ok(Some(flat)),
-                Polished::Refused => return Ok(None),
-                Polished::Overlaps => {}
+            let told_by_folds = limit.is_some() && self.steps.model() != Model::Paper;
+            if told_by_folds && self.folded_share(&start) > MOST_FOLDED {
+                return Ok(None);
+            }
+            let cleared = match limit {
+                // Of 29 trials on a body that Tutte's embedding had to save one came under the limit.
+                Some(_) => self.steps.clear_flips(&start)?,
+                None => Some(self.steps.remove_flips(&start)?),
+            };
+            let Some((uv, rung)) = cleared else { return Ok(None) };
+            rungs.take(rung);
+            if limit.is_some() && stretch::l2_stretch(self.steps.mesh, &self.steps.rest, &uv) > HOPELESS_START {
+                return Ok(None);
+            }
+            match self.free(&uv, limit)? {
+                Free::Simple(flat) => return Ok(Some(flat)),
+                Free::Refused => return Ok(None),
+                Free::Overlaps if self.steps.boundary_is_simple(&uv) => return self.apart(&uv, limit),
+                Free::Overlaps => {}
             }
         }
         self.flatten_apart(limit, rungs)
     }
 
-    /// From a start in the plane; `rung` is where it comes from.
     fn polish(
         &self,
         start: &[Point2<f64>],
-        limit: Option<f64>,
+        limit: f64,
         rung: Rung,
         rungs: &mut Rungs,
-    ) -> Result<Polished, StretchError> {
-        let told_by_folds = limit.is_some() && self.steps.model() != Model::Paper;
-        if told_by_folds && self.folded_share(start) > MOST_FOLDED {
-            return Ok(Polished::Refused);
+    ) -> Result<Option<Flat>, StretchError> {
+        if self.folded_share(start) > MOST_FOLDED {
+            return Ok(None);
         }
-        let (uv, how) = self.steps.remove_flips(start)?;
-        rungs.take(if how == Rung::Embedding { rung } else { how });
-        let hopeless = || stretch::l2_stretch(self.steps.mesh, &self.steps.rest, &uv) > HOPELESS_START;
-        if limit.is_some() && rung != Rung::Prolonged && hopeless() {
-            return Ok(Polished::Refused);
-        }
-        let judged = |uv| self.judge(uv, limit).map_or(Polished::Refused, Polished::Chart);
-        let Some(free) = self.minimise(&uv, limit, None)? else { return Ok(Polished::Refused) };
-        if self.steps.boundary_is_simple(&free.uv) {
-            return Ok(judged(free.uv));
-        }
-        if limit.is_some_and(|limit| free.l2 > limit) {
-            return Ok(Polished::Refused);
-        }
-        // The free boundary ran over itself: start without overlap and keep it so.
+        let Some(mut uv) = self.steps.clear_locally(start)? else { return Ok(None) };
+        rungs.take(if uv == start { rung } else { Rung::FoldoverFree });
         if !self.steps.boundary_is_simple(&uv) {
-            return Ok(Polished::Overlaps);
+            let Some(parted) = self.steps.part_boundary(&uv)? else { return Ok(None) };
+            uv = parted;
         }
-        Ok(match self.minimise(&uv, limit, Some(BOUNDARY_REACH))? {
-            Some(apart) if self.steps.boundary_is_simple(&apart.uv) => judged(apart.uv),
-            _ => Polished::Refused,
-        })
+        if !self.steps.boundary_is_tight(&uv) {
+            match self.free(&uv, Some(limit))? {
+                Free::Simple(flat) => return Ok(Some(flat)),
+                Free::Refused => return Ok(None),
+                Free::Overlaps => {}
+            }
+        }
+        self.apart(&uv, Some(limit))
+    }
+
+    /// Minimises from a start without flips, its boundary free.
+    fn free(&self, start: &[Point2<f64>], limit: Option<f64>) -> Result<Free, StretchError> {
+        let Some(best) = self.minimise(start, limit, None)? else { return Ok(Free::Refused) };
+        if self.steps.boundary_is_simple(&best.uv) {
+            return Ok(self.judge(best.uv, limit).map_or(Free::Refused, Free::Simple));
+        }
+        Ok(if limit.is_some_and(|limit| best.l2 > limit) { Free::Refused } else { Free::Overlaps })
+    }
+
+    /// Minimises from a start whose boundary is simple, and keeps it so.
+    fn apart(&self, start: &[Point2<f64>], limit: Option<f64>) -> Result<Option<Flat>, StretchError> {
+        let Some(best) = self.minimise(start, limit, Some(BOUNDARY_REACH))? else { return Ok(None) };
+        Ok(if self.steps.boundary_is_simple(&best.uv) { self.judge(best.uv, limit) } else { None })
     }
 
     fn flatten_apart(&self, limit: Option<f64>, rungs: &mut Rungs) -> Result<Option<Flat>, StretchError> {
         let Some(circle) = self.steps.on_circle()? else { return Ok(None) };
         rungs.take(Rung::TutteCircle);
-        let Some(best) = self.minimise(&circle, limit, Some(BOUNDARY_REACH))? else { return Ok(None) };
-        Ok(if self.steps.boundary_is_simple(&best.uv) { self.judge(best.uv, limit) } else { None })
+        self.apart(&circle, limit)
     }
 
     /// `None` where the distances do not span a plane; Tutte needs none.

@@ -5,13 +5,14 @@
 
 use rayon::prelude::*;
 
-use crate::charts::{Chart, Patch};
-use crate::mesh::{FaceId, HalfedgeId, TriMesh};
+use crate::charts::Chart;
+use crate::mesh::{HalfedgeId, TriMesh};
 use crate::progress::{Cancelled, Progress};
 use crate::settings::Settings;
 
-use super::charting::{self, Charting};
+use super::charting::Charting;
 use super::rungs::{Rung, Rungs};
+use super::sew;
 
 /// Failed unions a chart may take part in before it is left alone.
 const MOST_FAILURES: usize = 4;
@@ -93,8 +94,9 @@ pub(super) fn merge(
             .with_max_len(1)
             .map(|&(a, b)| {
                 let mut rungs = Rungs::default();
-                let union = union(mesh, polygon, &pool, a, b);
-                Ok((charting::try_chart(&union, settings, &mut rungs, progress)?, rungs))
+                let (Some(one), Some(other)) = (&pool[a], &pool[b]) else { return Ok((None, rungs)) };
+                let sides = [&one.chart, &other.chart];
+                Ok((sew::joined(mesh, polygon, sides, settings, &mut rungs, progress)?, rungs))
             })
             .collect();
         for (&(a, b), test) in pairs.iter().zip(tests) {
@@ -122,13 +124,6 @@ pub(super) fn merge(
     let mut charts: Vec<Chart> = pool.into_iter().flatten().map(|c| c.chart).collect();
     charts.sort_by_key(|c| c.patch.faces.iter().min().copied());
     Ok((charts, rungs))
-}
-
-fn union(mesh: &TriMesh, polygon: &[u32], pool: &[Option<Candidate>], a: usize, b: usize) -> Patch {
-    let faces_of = |i: usize| pool[i].iter().flat_map(|c| c.chart.patch.faces.iter().copied());
-    let mut faces: Vec<FaceId> = faces_of(a).chain(faces_of(b)).collect();
-    faces.sort_unstable();
-    Patch::of_surface(mesh, polygon, faces)
 }
 
 /// Shared border length of each pair of charts that may still be tested, sorted by pair.

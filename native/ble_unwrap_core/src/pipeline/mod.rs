@@ -14,6 +14,7 @@ mod flatten;
 mod merge;
 mod prolong;
 mod rungs;
+mod sew;
 mod steps;
 mod tally;
 

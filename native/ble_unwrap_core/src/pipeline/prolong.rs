@@ -35,26 +35,12 @@ pub(super) fn prolong(coarse: &Coarse, chart: &Chart, part: &Patch) -> Option<Pr
     let cuts = coarse_cuts(coarse, chart, &local);
     let patch = if cuts.edges.is_empty() { part.clone() } else { part.cut(&fine_cuts(coarse, part, &cuts)) };
     let topology = patch.mesh.topology();
-    eprintln!(
-        "P part {} guide {} cuts {:?} topology {:?} chart {:?}",
-        part.faces.len(),
-        chart.patch.faces.len(),
-        (cuts.edges.len(), cuts.landings.len()),
-        topology,
-        chart.patch.mesh.topology()
-    );
     if !topology.is_chart() || topology.loops != chart.patch.mesh.topology().loops {
         return None;
     }
     let base: Vec<FaceId> = patch.faces.iter().map(|f| local[coarse.face[f.index()].index()]).collect();
     let trusted = trusted_faces(&patch.mesh, &chart.patch.mesh, base)?;
     let start = places(&patch.mesh, chart, &trusted);
-    let flips = patch
-        .mesh
-        .faces()
-        .filter(|f| crate::distortion::signed_double_area(patch.mesh.triangle(*f).map(|v| start[v.index()])) <= 0.0)
-        .count();
-    eprintln!("P untrusted {} flips {flips}", trusted.iter().filter(|f| f.is_none()).count());
     Some(Prolonged { patch, start })
 }
 

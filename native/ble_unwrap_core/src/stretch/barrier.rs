@@ -36,6 +36,13 @@ pub(super) struct Barrier {
     area: f64,
 }
 
+/// Whether the boundary comes nearer to itself somewhere than [`BOUNDARY_REACH`], or touches itself. O(b log b) for b
+/// boundary edges of like length.
+#[must_use]
+pub fn boundary_is_tight(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> bool {
+    Barrier::new(mesh, rest, BOUNDARY_REACH).value(uv) > 0.0
+}
+
 /// A boundary vertex near a boundary edge.
 struct Contact {
     vertex: usize,

@@ -19,6 +19,10 @@ use crate::progress::Progress;
 /// Newton steps at most. Starts that resemble the surface take 3 to 35; vertices scattered at random are not
 /// untangled in 120 either, and Tutte's embedding serves them sooner.
 const MAX_ITERATIONS: usize = 40;
+/// In so many steps
+const ROUND: usize = 10;
+/// the flips must fall to this share, or it is given up.
+const LEAST_CLEARED: f64 = 0.8;
 /// Armijo's constant.
 const ARMIJO: f64 = 1e-4;
 /// Halvings before a step is given up.
@@ -54,6 +58,9 @@ pub(super) fn foldover_free_near(
     progress: &Progress,
 ) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
     let bad: Vec<bool> = mesh.faces().map(|f| is_collapsed(mesh, rest, start, f)).collect();
+    if !bad.contains(&true) {
+        return Ok(first_flip(mesh, start).is_none().then(|| start.to_vec()));
+    }
     let near = Neighbourhood::new(mesh, rest, &bad, rings);
     let Some(cleared) = clear(&near.mesh, &near.rest, &near.read(start), &near.pinned, COLLAPSED, progress)? else {
         return Ok(None);
@@ -78,9 +85,17 @@ fn clear(
     let mut trial = uv.clone();
     let mut direction = vec![0.0; 2 * uv.len()];
     let mut energy = FoldoverEnergy { epsilon: 1.0 };
-    for _ in 0..MAX_ITERATIONS {
+    let mut before_round = usize::MAX;
+    for iteration in 0..MAX_ITERATIONS {
         if first_flip(mesh, &uv).is_none() && system.least_determinant(&uv) >= least {
             return Ok(Some(uv));
+        }
+        if iteration % ROUND == 0 {
+            let flips = mesh.faces().filter(|&f| is_collapsed(mesh, rest, &uv, f)).count();
+            if flips as f64 > LEAST_CLEARED * before_round as f64 {
+                return Ok(None);
+            }
+            before_round = flips;
         }
         progress.check()?;
         let before = system.value(&energy, &uv);

@@ -26,6 +26,7 @@ mod measure;
 mod neighbourhood;
 mod newton;
 mod overlap;
+mod part_boundary;
 mod system;
 #[cfg(test)]
 mod test_meshes;
@@ -34,12 +35,13 @@ mod tutte;
 use nalgebra::Point2;
 use thiserror::Error;
 
-pub use barrier::BOUNDARY_REACH;
-pub use injective::{Injective, make_injective};
+pub use barrier::{BOUNDARY_REACH, boundary_is_tight};
+pub use injective::{Injective, clear_flips, clear_locally, make_injective};
 pub use measure::{
     l2_of_positions, l2_stretch, l2_unsigned, linf_stretch, plane_area, rescale_to_equal_area, surface_area,
 };
 pub use overlap::{BoundaryDefect, boundary_defect, boundary_is_simple, first_flip};
+pub use part_boundary::part_boundary;
 pub use tutte::{TutteBoundary, tutte_embedding};
 
 use crate::distortion::RestTriangle;

@@ -1,6 +1,6 @@
 //! The neighbourhood of a few bad triangles as a mesh of its own, so that mending them costs what lies there.
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 
 use crate::distortion::RestTriangle;
 use crate::mesh::{FaceId, TriMesh, VertexId};
@@ -42,6 +42,24 @@ impl Neighbourhood {
     /// The neighbourhood's part of a map.
     pub(super) fn read(&self, uv: &[Point2<f64>]) -> Vec<Point2<f64>> {
         self.vertices.iter().map(|v| uv[v.index()]).collect()
+    }
+
+    /// Moves each vertex that is not pinned to the middle of its neighbours, so many times; those on the boundary only
+    /// if they `retreat`, which takes them inwards.
+    pub(super) fn relax(&self, uv: &mut [Point2<f64>], sweeps: usize, retreat: bool) {
+        let mut part = self.read(uv);
+        let stays = |v: VertexId| self.pinned[v.index()] || (!retreat && self.mesh.is_boundary_vertex(v));
+        let moving: Vec<VertexId> = self.mesh.vertices().filter(|&v| !stays(v)).collect();
+        for _ in 0..sweeps {
+            for &v in &moving {
+                let (sum, count) = self
+                    .mesh
+                    .neighbours(v)
+                    .fold((Vector2::zeros(), 0.0), |(sum, n), w| (sum + part[w.index()].coords, n + 1.0));
+                part[v.index()] = Point2::from(sum / count);
+            }
+        }
+        self.write(&part, uv);
     }
 
     /// Puts the neighbourhood's part of a map in its place.

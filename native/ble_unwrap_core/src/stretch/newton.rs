@@ -30,6 +30,13 @@ const ABANDON_AFTER: usize = 5;
 /// A chart is abandoned if so many times its last gain would not bring it under the limit.
 const ABANDON_GAINS: f64 = 4.0;
 
+/// Or if after so many
+const FAR_AFTER: usize = 10;
+/// it is still this far above the limit.
+const FAR: f64 = 1.5;
+/// Under the barrier the last steps win little, and slowly: the tolerance is so many times what it is without.
+const APART_TOLERANCE: f64 = 10.0;
+
 /// A triangle of more than this squared stretch is among the worst,
 const WORST: f64 = 3.0;
 /// which are mended first if they are at most this share of all,
@@ -61,12 +68,11 @@ pub(super) fn minimise(
     rescale(mesh, &mut uv, scale, &mut scratch, options.keep_apart.is_some());
     let energy = StretchEnergy::new(settings.dirichlet_weight);
     let warm = StretchEnergy::new(settings.dirichlet_weight.max(0.5));
-    if options.keep_apart.is_none() {
-        relax_worst(mesh, rest, &mut uv, &warm, progress)?;
-    }
+    relax_worst(mesh, rest, &mut uv, &warm, options.keep_apart.is_some(), progress)?;
     let mut descent = Descent::new(mesh, rest, uv, Vec::new(), options.keep_apart)?;
     let mut result = Minimised { uv: Vec::new(), l2: 0.0, iterations: 0, abandoned: false, converged: false };
     let mut l2 = descent.system.stretch_sums(&descent.uv).l2();
+    let tolerance = if descent.barrier.is_some() { APART_TOLERANCE } else { 1.0 } * settings.tolerance;
     for iteration in 0..settings.max_iterations {
         progress.check()?;
         let warm_up = iteration < WARM_UP && descent.system.value(&energy, &descent.uv) > WARM_UP_ABOVE;
@@ -79,12 +85,13 @@ pub(super) fn minimise(
         result.iterations = iteration + 1;
         let l2_before = l2;
         l2 = descent.system.stretch_sums(&descent.uv).l2();
-        if !warm_up && before - after <= settings.tolerance * after {
+        if !warm_up && before - after <= tolerance * after {
             result.converged = true;
             break;
         }
         let gain = (l2_before - l2).max(0.0);
-        let out_of_reach = |limit: f64| l2 - ABANDON_GAINS * gain > limit;
+        let far = |limit: f64| iteration >= FAR_AFTER && l2 > FAR * limit;
+        let out_of_reach = |limit: f64| l2 - ABANDON_GAINS * gain > limit || far(limit);
         if iteration >= ABANDON_AFTER && options.abandon_above.is_some_and(out_of_reach) {
             result.abandoned = true;
             break;
@@ -102,6 +109,7 @@ fn relax_worst(
     rest: &[RestTriangle],
     uv: &mut [Point2<f64>],
     energy: &StretchEnergy,
+    keep_apart: bool,
     progress: &Progress,
 ) -> Result<(), StretchError> {
     let stretched =
@@ -122,7 +130,7 @@ fn relax_worst(
     }
     let mut relaxed = uv.to_vec();
     near.write(&descent.uv, &mut relaxed);
-    if first_flip(mesh, &relaxed).is_none() {
+    if first_flip(mesh, &relaxed).is_none() && !(keep_apart && !boundary_is_simple(mesh, &relaxed)) {
         uv.copy_from_slice(&relaxed);
     }
     Ok(())
