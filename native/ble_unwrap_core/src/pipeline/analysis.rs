@@ -8,6 +8,7 @@ use crate::mesh::{self, ConditionOptions, MeshInput, Surface};
 use crate::progress::{Cancelled, Progress, Stage};
 use crate::settings::{LimitOver, Settings};
 
+use super::memo::{Memo, Run};
 use super::rungs::Rungs;
 use super::tally::Tally;
 use super::{Atlas, Clock, budget, component, finish};
@@ -25,6 +26,7 @@ pub struct Analysis {
     face_offsets: Vec<i32>,
     weld: bool,
     prepared: Prepared,
+    memo: Memo,
 }
 
 impl Analysis {
@@ -35,8 +37,10 @@ impl Analysis {
     pub fn new(input: &MeshInput<'_>, weld: bool, progress: &Progress) -> Result<Self, UnwrapError> {
         progress.check()?;
         progress.enter(Stage::Condition);
+        let prepared = Prepared::new(input, weld, progress)?;
         Ok(Self {
-            prepared: Prepared::new(input, weld, progress)?,
+            memo: Memo::new(prepared.surface.mesh.face_count()),
+            prepared,
             positions: input.positions.to_vec(),
             corner_vertices: input.corner_vertices.to_vec(),
             face_offsets: input.face_offsets.to_vec(),
@@ -74,7 +78,8 @@ impl Analysis {
             face_offsets: &self.face_offsets,
             ..MeshInput::default()
         };
-        self.prepared.unwrap(&input, settings, Clock::new(), progress)
+        self.memo.begin();
+        self.prepared.unwrap(&input, settings, Clock::new(), &Run::new(progress, Some(&self.memo)))
     }
 }
 
@@ -98,7 +103,7 @@ impl Prepared {
         input: &MeshInput<'_>,
         settings: &Settings,
         mut clock: Clock,
-        progress: &Progress,
+        progress: &Run<'_>,
     ) -> Result<Atlas, UnwrapError> {
         progress.enter(Stage::Charts);
         let (surface, patches) = (&self.surface, &self.patches);

@@ -5,13 +5,14 @@
 
 use rayon::prelude::*;
 
-use crate::charts::{Chart, Patch};
-use crate::mesh::{FaceId, HalfedgeId, TriMesh};
-use crate::progress::{Cancelled, Progress};
+use crate::charts::Chart;
+use crate::mesh::{HalfedgeId, TriMesh};
+use crate::progress::Cancelled;
 use crate::settings::Settings;
 
-use super::charting;
+use super::memo::Run;
 use super::rungs::{Rung, Rungs};
+use super::sew;
 
 /// Share of the budget that is left for rounding to single precision.
 const RESERVE: f64 = 1e-4;
@@ -52,7 +53,7 @@ pub(super) fn spend(
     polygon: &[u32],
     charts: Vec<Chart>,
     settings: &Settings,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<(Vec<Chart>, Rungs), Cancelled> {
     let mut pool = Pool::new(mesh, polygon, charts, settings);
     let mut rungs = Rungs::default();
@@ -131,7 +132,7 @@ impl<'a> Pool<'a> {
     }
 
     /// The unions of pairs of neighbours that flatten within what is left.
-    fn offers(&self, pairs: Vec<([usize; 2], f64)>, progress: &Progress) -> Result<Vec<Union>, Cancelled> {
+    fn offers(&self, pairs: Vec<([usize; 2], f64)>, progress: &Run<'_>) -> Result<Vec<Union>, Cancelled> {
         let offer = |(pair, saved): ([usize; 2], f64)| {
             progress.check()?;
             let [Some(a), Some(b)] = pair.map(|i| self.members[i].as_ref()) else { return Ok(None) };
@@ -141,7 +142,8 @@ impl<'a> Pool<'a> {
             if settings.stretch_limit.is_nan() || settings.stretch_limit <= 1.0 {
                 return Ok(None);
             }
-            let union = self.joined([&a.chart, &b.chart], &settings, progress)?;
+            let sides = [&a.chart, &b.chart];
+            let union = sew::joined(self.mesh, self.polygon, sides, &settings, &mut Rungs::default(), progress)?;
             Ok(union.map(|chart| {
                 let added = (a.area + b.area) * chart.l2 * chart.l2 - a.stretch - b.stretch;
                 Union { pair, chart, added, price: added / saved.max(f64::MIN_POSITIVE) }
@@ -149,18 +151,6 @@ impl<'a> Pool<'a> {
         };
         let offers: Vec<Result<Option<Union>, Cancelled>> = pairs.into_par_iter().with_max_len(1).map(offer).collect();
         offers.into_iter().filter_map(Result::transpose).collect()
-    }
-
-    fn joined(
-        &self,
-        [a, b]: [&Chart; 2],
-        settings: &Settings,
-        progress: &Progress,
-    ) -> Result<Option<Chart>, Cancelled> {
-        let mut faces: Vec<FaceId> = a.patch.faces.iter().chain(&b.patch.faces).copied().collect();
-        faces.sort_unstable();
-        let union = Patch::of_surface(self.mesh, self.polygon, faces);
-        charting::try_chart(&union, settings, &mut Rungs::default(), progress)
     }
 
     /// Takes a union in place of its parts; returns its place.

@@ -8,11 +8,12 @@ use rayon::prelude::*;
 use crate::charts::{self, Chart, Patch};
 use crate::geodesics::{self, LandmarkDistances};
 use crate::mesh::{Topology, VertexId};
-use crate::progress::{Cancelled, Progress};
+use crate::progress::Cancelled;
 use crate::segmentation::{self, SpectralAnalysis};
 use crate::settings::{Holes, Settings};
 
 use super::flatten::{self, Flat};
+use super::memo::Run;
 use super::rungs::{Rung, Rungs};
 
 /// Patches less planar than this are split before any flattening. Far below what the embedding alone would
@@ -53,7 +54,7 @@ pub(super) fn chart(
     patches: Vec<Patch>,
     settings: &Settings,
     done: &(dyn Fn(f64) + Sync),
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Charting, Cancelled> {
     let whole = |patch| Piece { patch, splits: 0, family: None, inherited: None };
     let mut open: Vec<Piece> = patches.into_iter().map(whole).collect();
@@ -97,7 +98,7 @@ pub(super) fn chart(
     Ok(Charting { charts, family, rungs })
 }
 
-fn step(piece: &Piece, settings: &Settings, progress: &Progress) -> Result<(Step, Rungs), Cancelled> {
+fn step(piece: &Piece, settings: &Settings, progress: &Run<'_>) -> Result<(Step, Rungs), Cancelled> {
     progress.check()?;
     let (patch, splits) = (&piece.patch, piece.splits);
     let mut rungs = Rungs::default();
@@ -119,7 +120,7 @@ pub(super) fn split(
     patch: &Patch,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Vec<Patch>, Cancelled> {
     Attempt::new(patch, None, settings, progress).split(1, rungs)
 }
@@ -130,7 +131,7 @@ struct Attempt<'a> {
     topology: Topology,
     inherited: Option<&'a LandmarkDistances>,
     settings: &'a Settings,
-    progress: &'a Progress,
+    progress: &'a Run<'a>,
     measured: OnceCell<(LandmarkDistances, SpectralAnalysis)>,
 }
 
@@ -139,7 +140,7 @@ impl<'a> Attempt<'a> {
         patch: &'a Patch,
         inherited: Option<&'a LandmarkDistances>,
         settings: &'a Settings,
-        progress: &'a Progress,
+        progress: &'a Run<'a>,
     ) -> Self {
         Self { patch, topology: patch.mesh.topology(), inherited, settings, progress, measured: OnceCell::new() }
     }
@@ -257,7 +258,7 @@ impl<'a> Attempt<'a> {
 fn analyse(
     patch: &Patch,
     settings: &Settings,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<(LandmarkDistances, SpectralAnalysis), Cancelled> {
     let distances = geodesics::landmark_distances(&patch.mesh, &settings.geodesics, progress)?;
     let analysis = SpectralAnalysis::new(&distances);

@@ -11,12 +11,13 @@ use rayon::prelude::*;
 
 use crate::charts::{Chart, Patch};
 use crate::mesh::{self, Coarse, FaceId};
-use crate::progress::{Cancelled, Progress};
+use crate::progress::Cancelled;
 use crate::segmentation;
 use crate::settings::Settings;
 
 use super::charting::{self, Charting};
 use super::flatten;
+use super::memo::Run;
 use super::merge::{self, Which};
 use super::prolong::{Prolonged, prolong};
 use super::rungs::{Rung, Rungs};
@@ -51,7 +52,7 @@ pub(super) fn charts(
     patch: &Patch,
     settings: &Settings,
     tally: &Tally<'_>,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<(Vec<Chart>, Rungs), Cancelled> {
     let fine = Whole::new(patch.mesh.clone(), patch.polygon.clone());
     let size = patch.faces.len() as f64;
@@ -90,7 +91,7 @@ impl Whole {
         settings: &Settings,
         rungs: &mut Rungs,
         done: &(dyn Fn(f64) + Sync),
-        progress: &Progress,
+        progress: &Run<'_>,
     ) -> Result<Vec<Chart>, Cancelled> {
         let charting = charting::chart(vec![self.patch.clone()], settings, done, progress)?;
         rungs.add(&charting.rungs);
@@ -103,7 +104,7 @@ impl Whole {
         which: Which,
         settings: &Settings,
         rungs: &mut Rungs,
-        progress: &Progress,
+        progress: &Run<'_>,
     ) -> Result<Vec<Chart>, Cancelled> {
         if !settings.merge {
             return Ok(charting.charts);
@@ -141,7 +142,7 @@ struct OnCoarse<'a> {
 }
 
 impl<'a> OnCoarse<'a> {
-    fn new(fine: &'a Whole, settings: &'a Settings, progress: &Progress) -> Result<Self, Cancelled> {
+    fn new(fine: &'a Whole, settings: &'a Settings, progress: &Run<'_>) -> Result<Self, Cancelled> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
         let wanted = (COARSE_SHARE * fine.patch.mesh.vertex_count() as f64) as usize;
         let target = wanted.clamp(COARSE_VERTICES.0, COARSE_VERTICES.1);
@@ -154,13 +155,13 @@ impl<'a> OnCoarse<'a> {
     }
 
     /// Parts that flatten under the limit on the coarse mesh.
-    fn parts(&self, rungs: &mut Rungs, progress: &Progress) -> Result<Vec<Part>, Cancelled> {
+    fn parts(&self, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Vec<Part>, Cancelled> {
         let charts = self.whole.charts(&self.strict, rungs, &|_| (), progress)?;
         self.prolong_labels(&self.fine.patch, &charts, progress)
     }
 
     /// Divides a patch of the fine mesh as the coarse charts it lies on are divided.
-    fn prolong_labels(&self, patch: &Patch, charts: &[Chart], progress: &Progress) -> Result<Vec<Part>, Cancelled> {
+    fn prolong_labels(&self, patch: &Patch, charts: &[Chart], progress: &Run<'_>) -> Result<Vec<Part>, Cancelled> {
         const NONE: u32 = u32::MAX;
         let mut chart_of = vec![NONE; self.coarse.mesh.face_count()];
         for (number, chart) in charts.iter().enumerate() {
@@ -190,7 +191,7 @@ impl<'a> OnCoarse<'a> {
         parts: Vec<Part>,
         done: &(dyn Fn(f64) + Sync),
         rungs: &mut Rungs,
-        progress: &Progress,
+        progress: &Run<'_>,
     ) -> Result<Charting, Cancelled> {
         let mut open = parts;
         let mut rest = Vec::new();
@@ -236,7 +237,7 @@ impl<'a> OnCoarse<'a> {
         Ok(Charting { charts, family, rungs: charting.rungs })
     }
 
-    fn step(&self, part: &Part, rungs: &mut Rungs, progress: &Progress) -> Result<Outcome, Cancelled> {
+    fn step(&self, part: &Part, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Outcome, Cancelled> {
         progress.check()?;
         if let Some(Prolonged { patch, start }) = prolong(&self.coarse, &part.guide, &part.patch)
             && let Some(flat) = flatten::polish(&patch, &start, Rung::Prolonged, self.settings, rungs, progress)?

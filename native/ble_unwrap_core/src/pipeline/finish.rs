@@ -10,13 +10,14 @@ use crate::error::UnwrapError;
 use crate::mesh::{self, FaceId, MeshInput, Surface, measure};
 use crate::metrics::{self, Texture, UvMesh, UvMeshError};
 use crate::packing::{self, PackItem, Packed};
-use crate::progress::{Cancelled, Progress, Stage};
+use crate::progress::{Cancelled, Stage};
 use crate::report::Report;
 use crate::rounding::{self, Rounding};
 use crate::segmentation;
 use crate::settings::{ChartScale, LimitOver, Settings};
 use crate::verify::{self, Certificate};
 
+use super::memo::Run;
 use super::rungs::{Rung, Rungs};
 use super::{Atlas, Clock, charting, flatten};
 
@@ -45,7 +46,7 @@ pub(super) fn finish(
     mut rungs: Rungs,
     settings: &Settings,
     mut clock: Clock,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Atlas, UnwrapError> {
     let arrays = Arrays::new(input, surface, settings.weld);
     let mut round = 0;
@@ -182,7 +183,7 @@ impl Layout {
         surface: &Surface,
         charts: &[Chart],
         settings: &Settings,
-        progress: &Progress,
+        progress: &Run<'_>,
     ) -> Result<Self, UnwrapError> {
         let packed = pack(charts, settings, progress)?;
         let size = packed.size.map(f64::from);
@@ -222,7 +223,7 @@ impl Layout {
     }
 }
 
-fn pack(charts: &[Chart], settings: &Settings, progress: &Progress) -> Result<Packed, UnwrapError> {
+fn pack(charts: &[Chart], settings: &Settings, progress: &Run<'_>) -> Result<Packed, UnwrapError> {
     let index = |v: mesh::VertexId| u32::try_from(v.index()).unwrap_or(u32::MAX);
     let triangles: Vec<Vec<[u32; 3]>> =
         charts.iter().map(|c| c.patch.mesh.triangles().iter().map(|t| t.map(index)).collect()).collect();
@@ -260,7 +261,7 @@ fn mend(
     faults: &Faults<'_>,
     rungs: &mut Rungs,
     settings: &Settings,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Vec<Chart>, Cancelled> {
     let mut separate: Vec<(usize, u32)> =
         faults.broken.iter().map(|&(chart, face)| (chart, surface.polygon[face.index()])).collect();

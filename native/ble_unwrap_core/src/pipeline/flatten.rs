@@ -9,10 +9,11 @@ use crate::distortion::{self, RestTriangle};
 use crate::embedding::{self, EmbeddingError, Model};
 use crate::geodesics::LandmarkDistances;
 use crate::mesh::FaceId;
-use crate::progress::{Cancelled, Progress};
+use crate::progress::Cancelled;
 use crate::settings::Settings;
 use crate::stretch::{self, BOUNDARY_REACH, Minimised, StretchError};
 
+use super::memo::Run;
 use super::rungs::{Rung, Rungs};
 use super::steps::Steps;
 
@@ -81,7 +82,7 @@ pub(super) fn flatten(
     distances: &LandmarkDistances,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Option<Flat>, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
     recover(trial.flatten(distances, Some(settings.stretch_limit), rungs))
@@ -94,7 +95,7 @@ pub(super) fn projected(
     patch: &Patch,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Option<Option<Flat>>, Cancelled> {
     let Some(start) = embedding::project(&patch.mesh, MOST_LEANING) else { return Ok(None) };
     if stretch::first_flip(&patch.mesh, &start).is_some() || !stretch::boundary_is_simple(&patch.mesh, &start) {
@@ -119,7 +120,7 @@ pub(super) fn polish(
     rung: Rung,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Option<Flat>, Cancelled> {
     if let Some(flat) = isometric(patch, rungs) {
         return Ok(Some(flat));
@@ -135,7 +136,7 @@ pub(super) fn flatten_polygon(
     distances: &LandmarkDistances,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Flat, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
     if let Some(flat) = recover(trial.flatten(distances, None, rungs))? {
@@ -151,7 +152,7 @@ pub(super) fn flatten_apart(
     patch: &Patch,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Option<Flat>, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
     recover(trial.flatten_apart(Some(settings.stretch_limit), rungs))
@@ -203,7 +204,7 @@ struct Trial<'a> {
 }
 
 impl<'a> Trial<'a> {
-    fn new(patch: &'a Patch, settings: &'a Settings, progress: &'a Progress) -> Self {
+    fn new(patch: &'a Patch, settings: &'a Settings, progress: &'a Run<'a>) -> Self {
         // The same for a patch whatever else the surface holds.
         let seed = settings.seed ^ patch.faces.first().map_or(0, |f| f.index() as u64);
         Self { patch, steps: Steps::new(&patch.mesh, settings, seed, progress) }

@@ -7,10 +7,11 @@ use rayon::prelude::*;
 
 use crate::charts::Chart;
 use crate::mesh::{HalfedgeId, TriMesh};
-use crate::progress::{Cancelled, Progress};
+use crate::progress::Cancelled;
 use crate::settings::Settings;
 
 use super::charting::Charting;
+use super::memo::Run;
 use super::rungs::{Rung, Rungs};
 use super::sew;
 
@@ -56,7 +57,7 @@ pub(super) fn merge(
     charting: Charting,
     which: Which,
     settings: &Settings,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<(Vec<Chart>, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
     let family = charting.family;

@@ -11,6 +11,7 @@ mod charting;
 mod component;
 mod finish;
 mod flatten;
+mod memo;
 mod merge;
 mod prolong;
 mod rungs;
@@ -28,6 +29,7 @@ use crate::settings::Settings;
 
 pub use analysis::Analysis;
 use analysis::Prepared;
+use memo::Run;
 pub use rungs::{Rung, Rungs};
 pub(crate) use steps::Steps;
 
@@ -65,7 +67,7 @@ pub fn unwrap(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -
     progress.enter(Stage::Condition);
     let prepared = Prepared::new(input, settings.weld, progress)?;
     clock.lap("condition");
-    prepared.unwrap(input, settings, clock, progress)
+    prepared.unwrap(input, settings, clock, &Run::new(progress, None))
 }
 
 /// Seconds of each stage, for the report; nothing is decided by them.
