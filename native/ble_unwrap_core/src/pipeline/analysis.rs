@@ -1,14 +1,17 @@
 //! A mesh made ready to be unwrapped again and again.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use crate::charts::{Chart, Patch};
 use crate::error::UnwrapError;
 use crate::mesh::{self, ConditionOptions, MeshInput, Surface};
+use crate::packing::PackSettings;
 use crate::progress::{Cancelled, Progress, Stage};
-use crate::settings::{LimitOver, Settings};
+use crate::settings::{ChartScale, LimitOver, Settings};
 
-use super::memo::{Memo, Run};
+use super::memo::{self, Fingerprint, Kind, Memo, Run};
 use super::rungs::Rungs;
 use super::tally::Tally;
 use super::{Atlas, Clock, budget, component, finish};
@@ -83,6 +86,33 @@ impl Analysis {
     }
 }
 
+/// The charts of a component, and how they came about.
+type Made = (Vec<Chart>, Rungs);
+
+/// The charts of a component, or what they were under the same settings but for those of later stages.
+fn charts_of(
+    patch: &Patch,
+    settings: &Settings,
+    tally: &Tally<'_>,
+    progress: &Run<'_>,
+) -> Result<Arc<Made>, Cancelled> {
+    let input = |f: &mut Fingerprint| {
+        f.mesh(&patch.mesh);
+        f.numbers(&patch.polygon);
+        // They are named in the result.
+        f.indices(patch.faces.iter().map(|face| face.index()));
+        f.indices(patch.vertices.iter().map(|v| v.index()));
+        f.settings(&Settings {
+            limit_over: LimitOver::Chart,
+            chart_scale: ChartScale::Uniform,
+            packing: PackSettings::default(),
+            ..settings.clone()
+        });
+    };
+    let bytes = |made: &Made| made.0.iter().map(|c| memo::bytes_of(&c.patch.mesh) + 24 * c.uv.len()).sum();
+    progress.recall(Kind::Charts, input, bytes, || component::charts(patch, settings, tally, progress))
+}
+
 /// The surface of a mesh in connected pieces.
 #[derive(Debug)]
 pub(super) struct Prepared {
@@ -108,16 +138,16 @@ impl Prepared {
         progress.enter(Stage::Charts);
         let (surface, patches) = (&self.surface, &self.patches);
         let tally = Tally::new(progress, surface.mesh.face_count());
-        let made: Vec<Result<(Vec<Chart>, Rungs), Cancelled>> = patches
-            .par_iter()
-            .with_max_len(1)
-            .map(|patch| component::charts(patch, settings, &tally, progress))
-            .collect();
+        let made: Vec<Result<Arc<Made>, Cancelled>> =
+            patches.par_iter().with_max_len(1).map(|patch| charts_of(patch, settings, &tally, progress)).collect();
         let (mut charts, mut rungs) = (Vec::new(), Rungs::default());
         for component in made {
-            let (more, steps) = component?;
-            charts.extend(more);
-            rungs.add(&steps);
+            let component = component?;
+            rungs.add(&component.1);
+            match Arc::try_unwrap(component) {
+                Ok((more, _)) => charts.extend(more),
+                Err(kept) => charts.extend_from_slice(&kept.0),
+            }
         }
         if settings.limit_over == LimitOver::Atlas && settings.merge {
             let (joined, steps) = budget::spend(&surface.mesh, &surface.polygon, charts, settings, progress)?;

@@ -2,6 +2,7 @@
 
 use std::cell::OnceCell;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -9,11 +10,11 @@ use crate::charts::{self, Chart, Patch};
 use crate::geodesics::{self, LandmarkDistances};
 use crate::mesh::{Topology, VertexId};
 use crate::progress::Cancelled;
-use crate::segmentation::{self, SpectralAnalysis};
+use crate::segmentation::{self, Segmentation, SpectralAnalysis};
 use crate::settings::{Holes, Settings};
 
 use super::flatten::{self, Flat};
-use super::memo::Run;
+use super::memo::{Fingerprint, Kind, Run};
 use super::rungs::{Rung, Rungs};
 
 /// Patches less planar than this are split before any flattening. Far below what the embedding alone would
@@ -132,7 +133,7 @@ struct Attempt<'a> {
     inherited: Option<&'a LandmarkDistances>,
     settings: &'a Settings,
     progress: &'a Run<'a>,
-    measured: OnceCell<(LandmarkDistances, SpectralAnalysis)>,
+    measured: OnceCell<Arc<(LandmarkDistances, SpectralAnalysis)>>,
 }
 
 impl<'a> Attempt<'a> {
@@ -150,7 +151,7 @@ impl<'a> Attempt<'a> {
             return Ok(known);
         }
         let fresh = match self.inherited {
-            Some(distances) => (distances.clone(), SpectralAnalysis::new(distances)),
+            Some(distances) => Arc::new((distances.clone(), SpectralAnalysis::new(distances))),
             None => analyse(self.patch, self.settings, self.progress)?,
         };
         Ok(self.measured.get_or_init(|| fresh))
@@ -163,17 +164,30 @@ impl<'a> Attempt<'a> {
             rungs.take(Rung::Split);
             let (distances, analysis) = self.analysis()?;
             let cuts = &self.settings.segmentation;
-            segmentation::segment(&patch.mesh, &patch.polygon, distances, analysis, splits == 0, cuts, progress)?
+            let first = splits == 0;
+            let input = |f: &mut Fingerprint| {
+                f.mesh(&patch.mesh);
+                f.numbers(&patch.polygon);
+                f.distances(distances);
+                f.indices([usize::from(first)]);
+                f.settings(cuts);
+            };
+            progress.recall(
+                Kind::Segments,
+                input,
+                |s: &Segmentation| 4 * s.label.len(),
+                || segmentation::segment(&patch.mesh, &patch.polygon, distances, analysis, first, cuts, progress),
+            )?
         } else {
             rungs.take(Rung::Bisect);
-            segmentation::bisect(&patch.mesh, &patch.polygon)
+            Arc::new(segmentation::bisect(&patch.mesh, &patch.polygon))
         };
         Ok(patch.split(&parts.label, parts.parts))
     }
 
     /// The distances that a part of this patch takes over, if it has enough of them.
     fn heritage(&self, part: &Patch) -> Option<LandmarkDistances> {
-        let (distances, _) = self.measured.get()?;
+        let (distances, _) = &**self.measured.get()?;
         let least = self.settings.geodesics.landmark_reuse_min;
         if distances.len() < least {
             return None;
@@ -237,8 +251,9 @@ impl<'a> Attempt<'a> {
         if let Some(flat) = flatten::isometric(&open, rungs) {
             return Ok(Some(flat.into_chart(open)));
         }
-        let (distances, analysis) = analyse(&open, self.settings, self.progress)?;
-        Ok(self.flatten(&open, &distances, &analysis, rungs)?.map(|flat| flat.into_chart(open)))
+        let known = analyse(&open, self.settings, self.progress)?;
+        let (distances, analysis) = &*known;
+        Ok(self.flatten(&open, distances, analysis, rungs)?.map(|flat| flat.into_chart(open)))
     }
 
     fn flatten(
@@ -259,8 +274,15 @@ fn analyse(
     patch: &Patch,
     settings: &Settings,
     progress: &Run<'_>,
-) -> Result<(LandmarkDistances, SpectralAnalysis), Cancelled> {
-    let distances = geodesics::landmark_distances(&patch.mesh, &settings.geodesics, progress)?;
-    let analysis = SpectralAnalysis::new(&distances);
-    Ok((distances, analysis))
+) -> Result<Arc<(LandmarkDistances, SpectralAnalysis)>, Cancelled> {
+    let input = |f: &mut Fingerprint| {
+        f.mesh(&patch.mesh);
+        f.settings(&settings.geodesics);
+    };
+    let bytes = |known: &(LandmarkDistances, SpectralAnalysis)| 4 * known.0.len() * known.0.vertex_count();
+    progress.recall(Kind::Analysis, input, bytes, || {
+        let distances = geodesics::landmark_distances(&patch.mesh, &settings.geodesics, progress)?;
+        let analysis = SpectralAnalysis::new(&distances);
+        Ok((distances, analysis))
+    })
 }

@@ -6,18 +6,19 @@
 //! goes back to the coarse mesh to be split.
 
 use std::cmp::Reverse;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use crate::charts::{Chart, Patch};
 use crate::mesh::{self, Coarse, FaceId};
 use crate::progress::Cancelled;
-use crate::segmentation;
+use crate::segmentation::{self, Segmentation};
 use crate::settings::Settings;
 
 use super::charting::{self, Charting};
 use super::flatten;
-use super::memo::Run;
+use super::memo::{self, Fingerprint, Kind, Run};
 use super::merge::{self, Which};
 use super::prolong::{Prolonged, prolong};
 use super::rungs::{Rung, Rungs};
@@ -135,7 +136,7 @@ enum Outcome {
 struct OnCoarse<'a> {
     fine: &'a Whole,
     whole: Whole,
-    coarse: Coarse,
+    coarse: Arc<Coarse>,
     settings: &'a Settings,
     /// For the coarse mesh.
     strict: Settings,
@@ -146,7 +147,13 @@ impl<'a> OnCoarse<'a> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
         let wanted = (COARSE_SHARE * fine.patch.mesh.vertex_count() as f64) as usize;
         let target = wanted.clamp(COARSE_VERTICES.0, COARSE_VERTICES.1);
-        let coarse = mesh::coarsen(&fine.patch.mesh, target, progress)?;
+        let input = |f: &mut Fingerprint| {
+            f.mesh(&fine.patch.mesh);
+            f.indices([target]);
+        };
+        let bytes = |c: &Coarse| 4 * (c.face.len() + c.vertex.len()) + memo::bytes_of(&c.mesh);
+        let coarse =
+            progress.recall(Kind::Coarse, input, bytes, || mesh::coarsen(&fine.patch.mesh, target, progress))?;
         let polygon = (0..coarse.mesh.face_count()).map(|f| FaceId::new(f).index() as u32).collect();
         let whole = Whole::new(coarse.mesh.clone(), polygon);
         let mut strict = settings.clone();
@@ -173,7 +180,18 @@ impl<'a> OnCoarse<'a> {
         let mut label: Vec<u32> = patch.faces.iter().map(under).collect();
         spread_labels(&patch.mesh, &mut label);
         let crease_weight = self.settings.segmentation.crease_weight;
-        let parts = segmentation::straighten(&patch.mesh, &patch.polygon, &label, BAND_RINGS, crease_weight, progress)?;
+        let input = |f: &mut Fingerprint| {
+            f.mesh(&patch.mesh);
+            f.numbers(&patch.polygon);
+            f.numbers(&label);
+            f.reals([crease_weight]);
+        };
+        let parts = progress.recall(
+            Kind::Borders,
+            input,
+            |s: &Segmentation| 4 * s.label.len(),
+            || segmentation::straighten(&patch.mesh, &patch.polygon, &label, BAND_RINGS, crease_weight, progress),
+        )?;
         let guide_of = |part: &Patch| {
             let mut votes = vec![0usize; charts.len()];
             part.faces.iter().map(under).filter(|n| *n != NONE).for_each(|n| votes[n as usize] += 1);

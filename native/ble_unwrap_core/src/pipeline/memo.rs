@@ -11,6 +11,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use nalgebra::Point2;
 
+use crate::geodesics::LandmarkDistances;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 
@@ -22,16 +23,24 @@ const LEAST_BYTES: usize = 64 << 20;
 /// Kinds of results; each is of one type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Kind {
+    /// The charts of a component.
+    Charts,
     /// A coarse mesh.
     Coarse,
     /// Distances on a patch and their spectral analysis.
     Analysis,
     /// The labels of a patch's parts.
     Segments,
+    /// Labels with their borders redrawn.
+    Borders,
     /// A patch in the plane by its distances.
     Embedding,
     /// A start without flips.
     Cleared,
+    /// The same by its neighbourhood alone.
+    LocallyCleared,
+    /// A start whose boundary is simple.
+    Parted,
     /// A minimum of the stretch.
     Minimum,
 }
@@ -80,6 +89,17 @@ impl Fingerprint {
         self.word(count);
     }
 
+    pub(super) fn numbers(&mut self, values: &[u32]) {
+        self.indices(values.iter().map(|&v| v as usize));
+    }
+
+    pub(super) fn distances(&mut self, distances: &LandmarkDistances) {
+        self.indices(distances.landmarks().iter().map(|v| v.index()));
+        for l in 0..distances.len() {
+            self.indices(distances.row(l).iter().map(|d| d.to_bits() as usize));
+        }
+    }
+
     /// Positions, triangles, how they are glued, and guides.
     pub(super) fn mesh(&mut self, mesh: &TriMesh) {
         self.reals(mesh.positions().iter().flat_map(|p| [p.x, p.y, p.z]));
@@ -93,6 +113,11 @@ impl Fingerprint {
         let text = format!("{settings:?}");
         self.indices(text.bytes().map(usize::from));
     }
+}
+
+/// About the memory that a mesh takes.
+pub(super) fn bytes_of(mesh: &TriMesh) -> usize {
+    28 * mesh.vertex_count() + 24 * mesh.face_count()
 }
 
 struct Entry {
