@@ -1,7 +1,6 @@
 //! Surface to charts: flatten a patch, accept the chart or split the patch, until all are charts.
 
 use std::cell::OnceCell;
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -192,11 +191,11 @@ impl<'a> Attempt<'a> {
         if distances.len() < least {
             return None;
         }
-        let mut own: HashMap<VertexId, VertexId> = HashMap::with_capacity(self.patch.vertices.len());
-        for (i, v) in self.patch.vertices.iter().enumerate() {
-            own.entry(*v).or_insert(VertexId::new(i));
-        }
-        let vertices: Option<Vec<VertexId>> = part.vertices.iter().map(|v| own.get(v).copied()).collect();
+        let mut own: Vec<(VertexId, VertexId)> =
+            self.patch.vertices.iter().enumerate().map(|(i, v)| (*v, VertexId::new(i))).collect();
+        own.sort_unstable();
+        let find = |v: &VertexId| own.binary_search_by_key(v, |e| e.0).ok().map(|at| own[at].1);
+        let vertices: Option<Vec<VertexId>> = part.vertices.iter().map(find).collect();
         let taken = distances.restricted(&vertices?);
         (taken.len() >= least).then_some(taken)
     }

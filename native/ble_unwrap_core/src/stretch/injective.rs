@@ -12,8 +12,10 @@ use crate::distortion::RestTriangle;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 
-/// Up to this share of flipped triangles they are cleared in their neighbourhoods of so many rings,
+/// Up to this share of flipped triangles, and always if they are no more than
 const FEW_FLIPS: f64 = 0.02;
+/// so many, they are cleared in their neighbourhoods of so many rings,
+const ALWAYS_FEW: usize = 8;
 /// the second only where the first was too narrow.
 const NEIGHBOURHOODS: [usize; 2] = [3, 8];
 /// Each is smoothed first, by so many sweeps: a fold that hangs together is spread over it.
@@ -123,7 +125,7 @@ pub fn clear_locally(
     if count == 0 {
         return Ok(first_flip(mesh, start).is_none().then(|| start.to_vec()));
     }
-    if count as f64 > FEW_FLIPS * mesh.face_count() as f64 {
+    if count > ALWAYS_FEW && count as f64 > FEW_FLIPS * mesh.face_count() as f64 {
         return Ok(None);
     }
     let bad: Vec<bool> = mesh.faces().map(|f| is_collapsed(mesh, rest, start, f)).collect();
