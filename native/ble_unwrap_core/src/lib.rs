@@ -46,5 +46,5 @@ pub use mesh::{MeshError, MeshInput};
 pub use pipeline::{Analysis, Atlas, Rung, Rungs, unwrap};
 pub use progress::{Cancelled, Progress, Stage};
 pub use report::Report;
-pub use settings::{ChartScale, Holes, LimitOver, Settings};
+pub use settings::{ChartScale, Holes, LimitOver, NEVER_SEWN, Settings};
 pub use verify::{Certificate, Defect, verify};

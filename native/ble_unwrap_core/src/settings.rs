@@ -15,6 +15,9 @@ const PAPER_TOGETHER_MAX: usize = 2_000;
 /// Most vertices of a patch whose distances to each other can be handled: 8 GB and minutes.
 pub(crate) const MOST_TOGETHER: usize = 20_000;
 
+/// The value of [`Settings::least_sewn`] that keeps charts from being sewn.
+pub const NEVER_SEWN: f64 = 1e3;
+
 /// What happens to the holes of a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Holes {
@@ -61,6 +64,10 @@ pub struct Settings {
     pub coarse: bool,
     /// Whether neighbouring charts are joined again where their union stays under the limit.
     pub merge: bool,
+    /// Charts whose union would be over the limit are sewn along a part of their border, the rest being left as a dart,
+    /// where that part is at least this share of the square root of the smaller one's area: less for fewer charts and a
+    /// shorter seam, more for compact charts. From [`NEVER_SEWN`] on none are.
+    pub least_sewn: f64,
     /// Holes of charts.
     pub holes: Holes,
     /// Relative scale of charts.
@@ -91,6 +98,7 @@ impl Default for Settings {
             weld: false,
             coarse: true,
             merge: true,
+            least_sewn: 0.2,
             holes: Holes::Keep,
             chart_scale: ChartScale::Uniform,
             together_max: 0,
@@ -115,6 +123,8 @@ impl Settings {
         Self {
             holes: Holes::Cut,
             coarse: false,
+            least_sewn: NEVER_SEWN,
+            segmentation: SegmentationSettings::paper(),
             together_max: PAPER_TOGETHER_MAX,
             geodesics: GeodesicSettings::paper(),
             embedding: EmbeddingSettings::paper(),
@@ -155,7 +165,7 @@ impl Settings {
         let t = &self.stretch;
         let positive = "a positive number";
         let unit = "between 0 and 1";
-        let checks: [(&'static str, f64, bool, &'static str); 16] = [
+        let checks: [(&'static str, f64, bool, &'static str); 17] = [
             (
                 "stretch_limit",
                 self.stretch_limit,
@@ -171,6 +181,7 @@ impl Settings {
             ("landmark_min", g.landmark_min as f64, g.landmark_min >= 3, "at least 3"),
             ("landmark_max", g.landmark_max as f64, g.landmark_max >= g.landmark_min, "at least landmark_min"),
             ("together_max", self.together_max as f64, self.together_max <= MOST_TOGETHER, "at most 20,000"),
+            ("least_sewn", self.least_sewn, (0.0..=NEVER_SEWN).contains(&self.least_sewn), "between 0 and 1000"),
             ("first_parts", s.first_parts as f64, s.first_parts >= 2, "at least 2"),
             ("later_parts", s.later_parts as f64, s.later_parts >= 2, "at least 2"),
             ("band", s.band, (0.0..=1.0).contains(&s.band), unit),

@@ -11,12 +11,13 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::charts::{Chart, Patch};
-use crate::mesh::{self, Coarse, FaceId};
+use crate::mesh::{self, Coarse, FaceId, HalfedgeId};
 use crate::progress::Cancelled;
 use crate::segmentation::{self, Segmentation};
 use crate::settings::Settings;
 
 use super::charting::{self, Charting};
+use super::darts::{self, Sewn};
 use super::flatten;
 use super::memo::{self, Fingerprint, Kind, Run};
 use super::merge::{self, Which};
@@ -66,7 +67,8 @@ pub(super) fn charts(
         let charting = coarse.polish(parts, &done, &mut rungs, progress)?;
         fine.merge(charting, Which::AfterSplits { most_faces: FINE_UNION }, settings, &mut rungs, progress)?
     } else {
-        fine.charts(settings, &mut rungs, &|faces| tally.add(faces, 1.0), progress)?
+        let charts = fine.charts(settings, &mut rungs, &|faces| tally.add(faces, 1.0), progress)?;
+        fine.sew(charts, settings, &mut rungs, progress)?.into_iter().map(|sewn| sewn.chart).collect()
     };
     for f in charts.iter_mut().flat_map(|c| &mut c.patch.faces) {
         *f = patch.faces[f.index()];
@@ -99,6 +101,19 @@ impl Whole {
         self.merge(charting, Which::All, settings, rungs, progress)
     }
 
+    /// Sews charts of this mesh together.
+    fn sew(
+        &self,
+        charts: Vec<Chart>,
+        settings: &Settings,
+        rungs: &mut Rungs,
+        progress: &Run<'_>,
+    ) -> Result<Vec<Sewn>, Cancelled> {
+        let (sewn, steps) = darts::sew(&self.patch.mesh, &self.patch.polygon, charts, usize::MAX, settings, progress)?;
+        rungs.add(&steps);
+        Ok(sewn)
+    }
+
     fn merge(
         &self,
         charting: Charting,
@@ -118,11 +133,24 @@ impl Whole {
 }
 
 /// A part of the fine mesh and the chart of the coarse mesh that it lies on.
+#[derive(Clone)]
 struct Part {
     patch: Patch,
     guide: Chart,
+    /// The number of the guide among all, where it is not sewn.
+    number: usize,
+    /// What it was sewn of, to go back to.
+    pieces: Vec<Part>,
     /// The split in two that it came out of, if any.
     family: Option<u32>,
+}
+
+impl Part {
+    /// Whether an edge of the coarse mesh lies between two of the pieces that the guide is sewn of.
+    fn is_border(&self, coarse: &mesh::TriMesh, h: HalfedgeId) -> bool {
+        let piece = |h: HalfedgeId| self.pieces.iter().position(|p| p.guide.patch.faces.contains(&h.face()));
+        !self.pieces.is_empty() && piece(h) != piece(coarse.twin(h))
+    }
 }
 
 enum Outcome {
@@ -164,7 +192,31 @@ impl<'a> OnCoarse<'a> {
     /// Parts that flatten under the limit on the coarse mesh.
     fn parts(&self, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Vec<Part>, Cancelled> {
         let charts = self.whole.charts(&self.strict, rungs, &|_| (), progress)?;
-        self.prolong_labels(&self.fine.patch, &charts, progress)
+        let parts = self.prolong_labels(&self.fine.patch, &charts, progress)?;
+        let sewn = self.whole.sew(charts, &self.strict, rungs, progress)?;
+        Ok(self.join(parts, sewn))
+    }
+
+    /// Puts parts together whose guides have been sewn, cut where these are not.
+    fn join(&self, parts: Vec<Part>, sewn: Vec<Sewn>) -> Vec<Part> {
+        let mut rest: Vec<Option<Part>> = parts.into_iter().map(Some).collect();
+        let mut joined = Vec::new();
+        for sewn in sewn.into_iter().filter(|s| s.pieces.len() > 1) {
+            let mine = |p: &Option<Part>| p.as_ref().is_some_and(|p| sewn.pieces.contains(&p.number));
+            // A guide that has come to lie under two parts says of neither where to sew it.
+            if rest.iter().filter(|p| mine(p)).count() != sewn.pieces.len() {
+                continue;
+            }
+            let pieces: Vec<Part> = rest.iter_mut().filter(|p| mine(p)).filter_map(Option::take).collect();
+            let (coarse, fine) = (&self.coarse.mesh, &self.fine.patch);
+            let patches: Vec<(&Patch, &Chart)> = pieces.iter().map(|p| (&p.patch, &p.guide)).collect();
+            match darts::carried_over(coarse, &fine.mesh, &fine.polygon, &patches, &sewn) {
+                Some(patch) => joined.push(Part { patch, guide: sewn.chart, number: usize::MAX, pieces, family: None }),
+                None => joined.extend(pieces),
+            }
+        }
+        joined.extend(rest.into_iter().flatten());
+        joined
     }
 
     /// Divides a patch of the fine mesh as the coarse charts it lies on are divided.
@@ -196,10 +248,13 @@ impl<'a> OnCoarse<'a> {
             let mut votes = vec![0usize; charts.len()];
             part.faces.iter().map(under).filter(|n| *n != NONE).for_each(|n| votes[n as usize] += 1);
             let best = votes.iter().enumerate().max_by_key(|&(i, n)| (*n, Reverse(i)));
-            charts[best.map_or(0, |b| b.0)].clone()
+            best.map_or(0, |b| b.0)
         };
-        let patches = patch.split(&parts.label, parts.parts);
-        Ok(patches.into_iter().map(|patch| Part { guide: guide_of(&patch), patch, family: None }).collect())
+        let part = |patch: Patch| {
+            let number = guide_of(&patch);
+            Part { guide: charts[number].clone(), number, patch, pieces: Vec::new(), family: None }
+        };
+        Ok(patch.split(&parts.label, parts.parts).into_iter().map(part).collect())
     }
 
     /// Flattens the parts from where the coarse charts are. Those over the limit are split on the coarse mesh, those
@@ -257,10 +312,14 @@ impl<'a> OnCoarse<'a> {
 
     fn step(&self, part: &Part, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Outcome, Cancelled> {
         progress.check()?;
-        if let Some(Prolonged { patch, start }) = prolong(&self.coarse, &part.guide, &part.patch)
+        let done = |h: HalfedgeId| part.is_border(&self.coarse.mesh, h);
+        if let Some(Prolonged { patch, start }) = prolong(&self.coarse, &part.guide, &part.patch, done)
             && let Some(flat) = flatten::polish(&patch, &start, Rung::Prolonged, self.settings, rungs, progress)?
         {
             return Ok(Outcome::Accept(Box::new(flat.into_chart(patch))));
+        }
+        if !part.pieces.is_empty() {
+            return Ok(Outcome::Split(part.pieces.clone()));
         }
         let mut faces = part.guide.patch.faces.clone();
         if faces.len() <= LEAST_COARSE_FACES || part.patch.faces.len() <= LEAST_FINE_FACES {

@@ -9,6 +9,7 @@ mod analysis;
 mod budget;
 mod charting;
 mod component;
+mod darts;
 mod finish;
 mod flatten;
 mod memo;

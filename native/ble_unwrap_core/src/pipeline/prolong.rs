@@ -26,13 +26,19 @@ pub(super) struct Prolonged {
 }
 
 /// Carries `chart`, whose patch is made of faces of `coarse.mesh`, to `part`, made of faces of the fine mesh. `None`
-/// where the part does not come out with the topology of the chart, or hardly lies on it. O(m log m).
-pub(super) fn prolong(coarse: &Coarse, chart: &Chart, part: &Patch) -> Option<Prolonged> {
+/// where the part does not come out with the topology of the chart, or hardly lies on it. The part is cut already where the
+/// chart is along the edges for which `done` holds. O(m log m).
+pub(super) fn prolong(
+    coarse: &Coarse,
+    chart: &Chart,
+    part: &Patch,
+    done: impl Fn(HalfedgeId) -> bool,
+) -> Option<Prolonged> {
     let mut local = vec![FaceId::NONE; coarse.mesh.face_count()];
     for (i, f) in chart.patch.faces.iter().enumerate() {
         local[f.index()] = FaceId::new(i);
     }
-    let cuts = coarse_cuts(coarse, chart, &local);
+    let cuts = coarse_cuts(coarse, chart, &local, done);
     let patch = if cuts.edges.is_empty() { part.clone() } else { part.cut(&fine_cuts(coarse, part, &cuts)) };
     let topology = patch.mesh.topology();
     if !topology.is_chart() || topology.loops != chart.patch.mesh.topology().loops {
@@ -52,7 +58,7 @@ struct CoarseCuts {
     landings: Vec<VertexId>,
 }
 
-fn coarse_cuts(coarse: &Coarse, chart: &Chart, local: &[FaceId]) -> CoarseCuts {
+fn coarse_cuts(coarse: &Coarse, chart: &Chart, local: &[FaceId], done: impl Fn(HalfedgeId) -> bool) -> CoarseCuts {
     let outside = |h: HalfedgeId| h.is_none() || local[h.face().index()].is_none();
     let mut edges = Vec::new();
     let mut border = vec![false; coarse.mesh.vertex_count()];
@@ -61,7 +67,7 @@ fn coarse_cuts(coarse: &Coarse, chart: &Chart, local: &[FaceId]) -> CoarseCuts {
         let whole = chart.patch.faces[h.face().index()].halfedge(h.slot());
         let twin = coarse.mesh.twin(whole);
         let ends = [coarse.mesh.from(whole), coarse.mesh.to(whole)];
-        if outside(twin) {
+        if outside(twin) || done(whole) {
             ends.iter().for_each(|v| border[v.index()] = true);
         } else if whole < twin {
             edges.push(ends);

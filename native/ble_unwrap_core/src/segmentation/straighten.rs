@@ -1,7 +1,8 @@
 //! Borders drawn short and along creases in a narrow band of the fine mesh.
 //!
-//! Labels prolonged from a coarse mesh follow its edges in steps; a minimum cut a few polygons wide
-//! around every border replaces them by the shortest line there is.
+//! Labels prolonged from a coarse mesh follow its edges in steps. A minimum cut a few polygons wide around every border
+//! finds the short way and the crease, diffusion takes out the stairs that a cut along edges cannot see, and a last
+//! narrow cut the single teeth that are left.
 
 use std::collections::VecDeque;
 
@@ -10,7 +11,11 @@ use crate::progress::{Cancelled, Progress};
 
 use super::bends::{Bends, capacity};
 use super::polygon_graph::PolygonGraph;
+use super::smooth::{Guard, smooth};
 use super::{CutGraph, Segmentation, finish_labels};
+
+/// Sides by which the last cut may move a smooth border: enough to take single teeth off, too few for a detour.
+const TEETH: usize = 2;
 
 /// Redraws the borders between labels, each by one minimum cut among the polygons fewer than `rings`
 /// sides away from it, and makes every label connected (fragments go to a neighbour).
@@ -32,6 +37,26 @@ pub fn straighten(
     let mut label = graph.majority(mesh, label);
     super::repair::absorb_fragments(&graph, &mut label);
     let bends = Bends::new(mesh, &graph, crease_weight);
+    let guard = Guard::new(&graph, &label);
+    for rings in [rings, rings.min(TEETH)] {
+        let before = label.clone();
+        cut_borders(&graph, &bends, &mut label, rings, progress)?;
+        guard.restore(&graph, &before, &mut label);
+        if rings > TEETH {
+            smooth(&graph, &bends, &mut label, rings, progress)?;
+        }
+    }
+    Ok(finish_labels(&graph, label))
+}
+
+/// Makes every border the cheapest fewer than `rings` sides away.
+fn cut_borders(
+    graph: &PolygonGraph,
+    bends: &Bends,
+    label: &mut [u32],
+    rings: usize,
+    progress: &Progress,
+) -> Result<(), Cancelled> {
     let mut pairs: Vec<(u32, u32)> = Vec::new();
     for p in 0..graph.len() {
         let beyond = graph.links.group(p).iter().map(|l| label[l.to as usize]);
@@ -42,11 +67,11 @@ pub fn straighten(
     let mut band = Band { ring: vec![usize::MAX; graph.len()], node: vec![usize::MAX; graph.len()], order: Vec::new() };
     for (a, b) in pairs {
         progress.check()?;
-        band.gather(&graph, &label, a, b, rings);
-        band.cut(&graph, &bends, &mut label, a, b, progress)?;
+        band.gather(graph, label, a, b, rings);
+        band.cut(graph, bends, label, a, b, progress)?;
         band.clear();
     }
-    Ok(finish_labels(&graph, label))
+    Ok(())
 }
 
 /// The polygons around one border, by distance from it in sides.
