@@ -28,7 +28,8 @@ const LEAST_FACES_TO_CUT: usize = 8;
 /// The charts of a surface and how they came about.
 pub(super) struct Charting {
     pub(super) charts: Vec<Chart>,
-    /// For each chart, the split in two that it came out of, if any.
+    /// For each chart, the split that it came out of, if any; the same for both halves of a split in two, and else for no
+    /// other.
     pub(super) family: Vec<Option<u32>>,
     pub(super) rungs: Rungs,
 }
@@ -84,10 +85,13 @@ pub(super) fn chart(
                     accepted.push((*chart, piece.family));
                 }
                 Step::Split(parts) => {
-                    let family = (parts.len() == 2).then_some(split_count);
-                    split_count += 1;
                     let splits = piece.splits + 1;
-                    next.extend(parts.into_iter().map(|(patch, inherited)| Piece { patch, splits, family, inherited }));
+                    let halves = parts.len() == 2;
+                    for (patch, inherited) in parts {
+                        next.push(Piece { patch, splits, family: Some(split_count), inherited });
+                        split_count += u32::from(!halves);
+                    }
+                    split_count += 1;
                 }
             }
         }

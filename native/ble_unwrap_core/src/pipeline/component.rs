@@ -141,7 +141,7 @@ struct Part {
     number: usize,
     /// What it was sewn of, to go back to.
     pieces: Vec<Part>,
-    /// The split in two that it came out of, if any.
+    /// The split that it came out of, if any; the same for both halves of one in two, and else for no other.
     family: Option<u32>,
 }
 
@@ -292,8 +292,10 @@ impl<'a> OnCoarse<'a> {
                     Outcome::Accept(chart) => accepted.push((*chart, part.family)),
                     Outcome::Fine => rest.push(part.patch),
                     Outcome::Split(mut parts) => {
-                        if parts.len() == 2 {
-                            parts.iter_mut().for_each(|p| p.family = Some(split_count));
+                        let halves = parts.len() == 2;
+                        for part in &mut parts {
+                            part.family = Some(split_count);
+                            split_count += u32::from(!halves);
                         }
                         split_count += 1;
                         next.extend(parts);
@@ -303,8 +305,10 @@ impl<'a> OnCoarse<'a> {
             open = next;
         }
         let charting = charting::chart(rest, self.settings, done, progress)?;
-        let family = |f: Option<u32>| f.map(|f| f + split_count);
-        accepted.extend(charting.charts.into_iter().zip(charting.family.into_iter().map(family)));
+        // What is charted anew has not been tried with its neighbours on the coarse mesh either.
+        let alone = split_count + charting.family.iter().flatten().max().map_or(0, |most| most + 1);
+        let family = (alone..).zip(charting.family).map(|(own, f)| Some(f.map_or(own, |f| f + split_count)));
+        accepted.extend(charting.charts.into_iter().zip(family));
         accepted.sort_by_key(|(c, _)| c.patch.faces[0]);
         let (charts, family) = accepted.into_iter().unzip();
         Ok(Charting { charts, family, rungs: charting.rungs })

@@ -170,18 +170,7 @@ impl Sides<'_> {
                 places[side][v.index()] = Some(if side == 0 { p } else { moved(p) });
             }
         }
-        let mut start = vec![Point2::origin(); n];
-        let middle: Vec<Option<Point2<f64>>> =
-            places[0].iter().zip(&places[1]).map(|(p, q)| Some(nalgebra::center(&(*p)?, &(*q)?))).collect();
-        for places in &places {
-            let shift = spread_shift(&patch.mesh, places, &middle);
-            for ((to, place), shift) in start.iter_mut().zip(places).zip(shift) {
-                if let Some(p) = place {
-                    *to = p + shift;
-                }
-            }
-        }
-        start
+        met(&patch.mesh, &places)
     }
 
     /// The rigid motion of the second chart that takes its side of the seam nearest to the first's, by length.
@@ -205,6 +194,23 @@ impl Sides<'_> {
         let turn = Rotation2::new(f64::atan2(sin, cos));
         move |p| Point2::from(turn * (p.coords - from) + to)
     }
+}
+
+/// A position for each vertex of a union, from where either side puts those it has: what they share lies in the middle,
+/// and the rest gives way towards it.
+pub(super) fn met(mesh: &TriMesh, places: &[Vec<Option<Point2<f64>>>; 2]) -> Vec<Point2<f64>> {
+    let mut start = vec![Point2::origin(); mesh.vertex_count()];
+    let middle: Vec<Option<Point2<f64>>> =
+        places[0].iter().zip(&places[1]).map(|(p, q)| Some(nalgebra::center(&(*p)?, &(*q)?))).collect();
+    for places in places {
+        let shift = spread_shift(mesh, places, &middle);
+        for ((to, place), shift) in start.iter_mut().zip(places).zip(shift) {
+            if let Some(p) = place {
+                *to = p + shift;
+            }
+        }
+    }
+    start
 }
 
 /// How far each vertex of a side moves when its border moves to the middle between both sides: less and less, away from
