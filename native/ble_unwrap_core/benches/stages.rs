@@ -99,7 +99,7 @@ impl Polygons {
             corner_vertices: &self.flat.corner_vertices,
             face_offsets: &self.flat.face_offsets,
             corner_triangles: None,
-            seams: &[],
+            ..MeshInput::default()
         }
     }
 

@@ -109,7 +109,7 @@ mod sampled {
             corner_vertices: &flat.corner_vertices,
             face_offsets: &flat.face_offsets,
             corner_triangles: None,
-            seams: &[],
+            ..MeshInput::default()
         };
         let one = ThreadPoolBuilder::new().num_threads(1).build()?;
         let run = || one.install(|| unwrap(&input, &Settings::default(), &Progress::new()));

@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         corner_vertices: &corners,
         face_offsets: &offsets,
         corner_triangles: None,
-        seams: &[],
+        ..MeshInput::default()
     };
     let atlas = unwrap(&mesh, &settings, &Progress::new())?;
     println!("{:#?}", atlas.report);

@@ -54,7 +54,7 @@ fn quality_is_what_it_was() {
             corner_vertices: &flat.corner_vertices,
             face_offsets: &flat.face_offsets,
             corner_triangles: None,
-            seams: &[],
+            ..MeshInput::default()
         };
         let report = unwrap(&input, &Settings::default(), &Progress::new()).expect("unwraps").report;
         let good = (row.charts[0]..=row.charts[1]).contains(&report.charts)

@@ -1,17 +1,19 @@
 //! Surface to charts: flatten a patch, accept the chart or split the patch, until all are charts.
 
 use std::cell::OnceCell;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use crate::charts::{self, Chart, Patch};
 use crate::geodesics::{self, LandmarkDistances};
 use crate::mesh::{Topology, VertexId};
-use crate::progress::{Cancelled, Progress};
-use crate::segmentation::{self, SpectralAnalysis};
+use crate::progress::Cancelled;
+use crate::segmentation::{self, Segmentation, SpectralAnalysis};
 use crate::settings::{Holes, Settings};
 
 use super::flatten::{self, Flat};
+use super::memo::{Fingerprint, Kind, Run};
 use super::rungs::{Rung, Rungs};
 
 /// Patches less planar than this are split before any flattening. Far below what the embedding alone would
@@ -53,7 +55,7 @@ pub(super) fn chart(
     patches: Vec<Patch>,
     settings: &Settings,
     done: &(dyn Fn(f64) + Sync),
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Charting, Cancelled> {
     let whole = |patch| Piece { patch, splits: 0, family: None, inherited: None };
     let mut open: Vec<Piece> = patches.into_iter().map(whole).collect();
@@ -100,7 +102,7 @@ pub(super) fn chart(
     Ok(Charting { charts, family, rungs })
 }
 
-fn step(piece: &Piece, settings: &Settings, progress: &Progress) -> Result<(Step, Rungs), Cancelled> {
+fn step(piece: &Piece, settings: &Settings, progress: &Run<'_>) -> Result<(Step, Rungs), Cancelled> {
     progress.check()?;
     let (patch, splits) = (&piece.patch, piece.splits);
     let mut rungs = Rungs::default();
@@ -122,7 +124,7 @@ pub(super) fn split(
     patch: &Patch,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Vec<Patch>, Cancelled> {
     Attempt::new(patch, None, settings, progress).split(1, rungs)
 }
@@ -133,8 +135,8 @@ struct Attempt<'a> {
     topology: Topology,
     inherited: Option<&'a LandmarkDistances>,
     settings: &'a Settings,
-    progress: &'a Progress,
-    measured: OnceCell<(LandmarkDistances, SpectralAnalysis)>,
+    progress: &'a Run<'a>,
+    measured: OnceCell<Arc<(LandmarkDistances, SpectralAnalysis)>>,
 }
 
 impl<'a> Attempt<'a> {
@@ -142,7 +144,7 @@ impl<'a> Attempt<'a> {
         patch: &'a Patch,
         inherited: Option<&'a LandmarkDistances>,
         settings: &'a Settings,
-        progress: &'a Progress,
+        progress: &'a Run<'a>,
     ) -> Self {
         Self { patch, topology: patch.mesh.topology(), inherited, settings, progress, measured: OnceCell::new() }
     }
@@ -152,7 +154,7 @@ impl<'a> Attempt<'a> {
             return Ok(known);
         }
         let fresh = match self.inherited {
-            Some(distances) => (distances.clone(), SpectralAnalysis::new(distances)),
+            Some(distances) => Arc::new((distances.clone(), SpectralAnalysis::new(distances))),
             None => analyse(self.patch, self.settings, self.progress)?,
         };
         Ok(self.measured.get_or_init(|| fresh))
@@ -165,17 +167,30 @@ impl<'a> Attempt<'a> {
             rungs.take(Rung::Split);
             let (distances, analysis) = self.analysis()?;
             let cuts = &self.settings.segmentation;
-            segmentation::segment(&patch.mesh, &patch.polygon, distances, analysis, splits == 0, cuts, progress)?
+            let first = splits == 0;
+            let input = |f: &mut Fingerprint| {
+                f.mesh(&patch.mesh);
+                f.numbers(&patch.polygon);
+                f.distances(distances);
+                f.indices([usize::from(first)]);
+                f.settings(cuts);
+            };
+            progress.recall(
+                Kind::Segments,
+                input,
+                |s: &Segmentation| 4 * s.label.len(),
+                || segmentation::segment(&patch.mesh, &patch.polygon, distances, analysis, first, cuts, progress),
+            )?
         } else {
             rungs.take(Rung::Bisect);
-            segmentation::bisect(&patch.mesh, &patch.polygon)
+            Arc::new(segmentation::bisect(&patch.mesh, &patch.polygon))
         };
         Ok(patch.split(&parts.label, parts.parts))
     }
 
     /// The distances that a part of this patch takes over, if it has enough of them.
     fn heritage(&self, part: &Patch) -> Option<LandmarkDistances> {
-        let (distances, _) = self.measured.get()?;
+        let (distances, _) = &**self.measured.get()?;
         let least = self.settings.geodesics.landmark_reuse_min;
         if distances.len() < least {
             return None;
@@ -221,7 +236,7 @@ impl<'a> Attempt<'a> {
         if self.topology.is_disk() || blob || patch.faces.len() < LEAST_FACES_TO_CUT {
             return Ok(None);
         }
-        let length = |h| patch.mesh.edge_length(h);
+        let length = |h| patch.mesh.edge_length(h) * patch.mesh.border_cost(h);
         let diagonal = |h| patch.is_diagonal(h);
         if self.topology.genus() > 0 && self.settings.holes == Holes::Keep {
             let open = patch.cut(&charts::cut_open(&patch.mesh, length, diagonal));
@@ -239,8 +254,9 @@ impl<'a> Attempt<'a> {
         if let Some(flat) = flatten::isometric(&open, rungs) {
             return Ok(Some(flat.into_chart(open)));
         }
-        let (distances, analysis) = analyse(&open, self.settings, self.progress)?;
-        Ok(self.flatten(&open, &distances, &analysis, rungs)?.map(|flat| flat.into_chart(open)))
+        let known = analyse(&open, self.settings, self.progress)?;
+        let (distances, analysis) = &*known;
+        Ok(self.flatten(&open, distances, analysis, rungs)?.map(|flat| flat.into_chart(open)))
     }
 
     fn flatten(
@@ -260,9 +276,16 @@ impl<'a> Attempt<'a> {
 fn analyse(
     patch: &Patch,
     settings: &Settings,
-    progress: &Progress,
-) -> Result<(LandmarkDistances, SpectralAnalysis), Cancelled> {
-    let distances = geodesics::landmark_distances(&patch.mesh, &settings.geodesics, progress)?;
-    let analysis = SpectralAnalysis::new(&distances);
-    Ok((distances, analysis))
+    progress: &Run<'_>,
+) -> Result<Arc<(LandmarkDistances, SpectralAnalysis)>, Cancelled> {
+    let input = |f: &mut Fingerprint| {
+        f.mesh(&patch.mesh);
+        f.settings(&settings.geodesics);
+    };
+    let bytes = |known: &(LandmarkDistances, SpectralAnalysis)| 4 * known.0.len() * known.0.vertex_count();
+    progress.recall(Kind::Analysis, input, bytes, || {
+        let distances = geodesics::landmark_distances(&patch.mesh, &settings.geodesics, progress)?;
+        let analysis = SpectralAnalysis::new(&distances);
+        Ok((distances, analysis))
+    })
 }

@@ -6,18 +6,20 @@
 //! goes back to the coarse mesh to be split.
 
 use std::cmp::Reverse;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use crate::charts::{Chart, Patch};
 use crate::mesh::{self, Coarse, FaceId, HalfedgeId};
-use crate::progress::{Cancelled, Progress};
-use crate::segmentation;
+use crate::progress::Cancelled;
+use crate::segmentation::{self, Segmentation};
 use crate::settings::Settings;
 
 use super::charting::{self, Charting};
 use super::darts::{self, Sewn};
 use super::flatten;
+use super::memo::{self, Fingerprint, Kind, Run};
 use super::merge::{self, Which};
 use super::prolong::{Prolonged, prolong};
 use super::rungs::{Rung, Rungs};
@@ -52,7 +54,7 @@ pub(super) fn charts(
     patch: &Patch,
     settings: &Settings,
     tally: &Tally<'_>,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<(Vec<Chart>, Rungs), Cancelled> {
     let fine = Whole::new(patch.mesh.clone(), patch.polygon.clone());
     let size = patch.faces.len() as f64;
@@ -92,7 +94,7 @@ impl Whole {
         settings: &Settings,
         rungs: &mut Rungs,
         done: &(dyn Fn(f64) + Sync),
-        progress: &Progress,
+        progress: &Run<'_>,
     ) -> Result<Vec<Chart>, Cancelled> {
         let charting = charting::chart(vec![self.patch.clone()], settings, done, progress)?;
         rungs.add(&charting.rungs);
@@ -105,7 +107,7 @@ impl Whole {
         charts: Vec<Chart>,
         settings: &Settings,
         rungs: &mut Rungs,
-        progress: &Progress,
+        progress: &Run<'_>,
     ) -> Result<Vec<Sewn>, Cancelled> {
         let (sewn, steps) = darts::sew(&self.patch.mesh, &self.patch.polygon, charts, usize::MAX, settings, progress)?;
         rungs.add(&steps);
@@ -118,7 +120,7 @@ impl Whole {
         which: Which,
         settings: &Settings,
         rungs: &mut Rungs,
-        progress: &Progress,
+        progress: &Run<'_>,
     ) -> Result<Vec<Chart>, Cancelled> {
         if !settings.merge {
             return Ok(charting.charts);
@@ -162,18 +164,24 @@ enum Outcome {
 struct OnCoarse<'a> {
     fine: &'a Whole,
     whole: Whole,
-    coarse: Coarse,
+    coarse: Arc<Coarse>,
     settings: &'a Settings,
     /// For the coarse mesh.
     strict: Settings,
 }
 
 impl<'a> OnCoarse<'a> {
-    fn new(fine: &'a Whole, settings: &'a Settings, progress: &Progress) -> Result<Self, Cancelled> {
+    fn new(fine: &'a Whole, settings: &'a Settings, progress: &Run<'_>) -> Result<Self, Cancelled> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
         let wanted = (COARSE_SHARE * fine.patch.mesh.vertex_count() as f64) as usize;
         let target = wanted.clamp(COARSE_VERTICES.0, COARSE_VERTICES.1);
-        let coarse = mesh::coarsen(&fine.patch.mesh, target, progress)?;
+        let input = |f: &mut Fingerprint| {
+            f.mesh(&fine.patch.mesh);
+            f.indices([target]);
+        };
+        let bytes = |c: &Coarse| 4 * (c.face.len() + c.vertex.len()) + memo::bytes_of(&c.mesh);
+        let coarse =
+            progress.recall(Kind::Coarse, input, bytes, || mesh::coarsen(&fine.patch.mesh, target, progress))?;
         let polygon = (0..coarse.mesh.face_count()).map(|f| FaceId::new(f).index() as u32).collect();
         let whole = Whole::new(coarse.mesh.clone(), polygon);
         let mut strict = settings.clone();
@@ -182,7 +190,7 @@ impl<'a> OnCoarse<'a> {
     }
 
     /// Parts that flatten under the limit on the coarse mesh.
-    fn parts(&self, rungs: &mut Rungs, progress: &Progress) -> Result<Vec<Part>, Cancelled> {
+    fn parts(&self, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Vec<Part>, Cancelled> {
         let charts = self.whole.charts(&self.strict, rungs, &|_| (), progress)?;
         let parts = self.prolong_labels(&self.fine.patch, &charts, progress)?;
         let sewn = self.whole.sew(charts, &self.strict, rungs, progress)?;
@@ -212,7 +220,7 @@ impl<'a> OnCoarse<'a> {
     }
 
     /// Divides a patch of the fine mesh as the coarse charts it lies on are divided.
-    fn prolong_labels(&self, patch: &Patch, charts: &[Chart], progress: &Progress) -> Result<Vec<Part>, Cancelled> {
+    fn prolong_labels(&self, patch: &Patch, charts: &[Chart], progress: &Run<'_>) -> Result<Vec<Part>, Cancelled> {
         const NONE: u32 = u32::MAX;
         let mut chart_of = vec![NONE; self.coarse.mesh.face_count()];
         for (number, chart) in charts.iter().enumerate() {
@@ -223,7 +231,19 @@ impl<'a> OnCoarse<'a> {
         let under = |f: &FaceId| chart_of[self.coarse.face[f.index()].index()];
         let mut label: Vec<u32> = patch.faces.iter().map(under).collect();
         spread_labels(&patch.mesh, &mut label);
-        let parts = segmentation::straighten(&patch.mesh, &patch.polygon, &label, BAND_RINGS, progress)?;
+        let crease_weight = self.settings.segmentation.crease_weight;
+        let input = |f: &mut Fingerprint| {
+            f.mesh(&patch.mesh);
+            f.numbers(&patch.polygon);
+            f.numbers(&label);
+            f.reals([crease_weight]);
+        };
+        let parts = progress.recall(
+            Kind::Borders,
+            input,
+            |s: &Segmentation| 4 * s.label.len(),
+            || segmentation::straighten(&patch.mesh, &patch.polygon, &label, BAND_RINGS, crease_weight, progress),
+        )?;
         let guide_of = |part: &Patch| {
             let mut votes = vec![0usize; charts.len()];
             part.faces.iter().map(under).filter(|n| *n != NONE).for_each(|n| votes[n as usize] += 1);
@@ -244,7 +264,7 @@ impl<'a> OnCoarse<'a> {
         parts: Vec<Part>,
         done: &(dyn Fn(f64) + Sync),
         rungs: &mut Rungs,
-        progress: &Progress,
+        progress: &Run<'_>,
     ) -> Result<Charting, Cancelled> {
         let mut open = parts;
         let mut rest = Vec::new();
@@ -294,7 +314,7 @@ impl<'a> OnCoarse<'a> {
         Ok(Charting { charts, family, rungs: charting.rungs })
     }
 
-    fn step(&self, part: &Part, rungs: &mut Rungs, progress: &Progress) -> Result<Outcome, Cancelled> {
+    fn step(&self, part: &Part, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Outcome, Cancelled> {
         progress.check()?;
         let done = |h: HalfedgeId| part.is_border(&self.coarse.mesh, h);
         if let Some(Prolonged { patch, start }) = prolong(&self.coarse, &part.guide, &part.patch, done)

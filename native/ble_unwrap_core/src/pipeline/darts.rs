@@ -11,10 +11,11 @@ use rayon::prelude::*;
 
 use crate::charts::{Chart, Patch};
 use crate::mesh::{DisjointSets, FaceId, HalfedgeId, TriMesh, VertexId};
-use crate::progress::{Cancelled, Progress};
+use crate::progress::Cancelled;
 use crate::settings::{NEVER_SEWN, Settings};
 
 use super::flatten;
+use super::memo;
 use super::rungs::{Rung, Rungs};
 use super::sew;
 
@@ -60,7 +61,7 @@ pub(super) fn sew(
     charts: Vec<Chart>,
     most_faces: usize,
     settings: &Settings,
-    progress: &Progress,
+    progress: &memo::Run<'_>,
 ) -> Result<(Vec<Sewn>, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
     let most_faces = if settings.least_sewn < NEVER_SEWN { most_faces } else { 0 };
@@ -475,6 +476,7 @@ fn longest_chain(mesh: &TriMesh, edges: &[HalfedgeId]) -> Vec<HalfedgeId> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Progress;
     use crate::mesh::test_surfaces;
     use crate::pipeline::charting;
 
@@ -489,7 +491,8 @@ mod tests {
         let chart = |wanted: usize| {
             let faces = mesh.faces().filter(|f| label(mesh.triangle_positions(*f)) == wanted).collect();
             let patch = Patch::of_surface(mesh, &polygon, faces);
-            let charting = charting::chart(vec![patch], settings, &|_| (), &Progress::new()).expect("not cancelled");
+            let charting = charting::chart(vec![patch], settings, &|_| (), &memo::Run::new(&Progress::new(), None))
+                .expect("not cancelled");
             assert_eq!(charting.charts.len(), 1);
             charting.charts.into_iter().next().expect("a chart")
         };
@@ -498,7 +501,8 @@ mod tests {
 
     fn sewn(mesh: &TriMesh, charts: Vec<Chart>, settings: &Settings) -> (Vec<Sewn>, Rungs) {
         let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
-        let result = sew(mesh, &polygon, charts, usize::MAX, settings, &Progress::new()).expect("not cancelled");
+        let result = sew(mesh, &polygon, charts, usize::MAX, settings, &memo::Run::new(&Progress::new(), None))
+            .expect("not cancelled");
         for s in &result.0 {
             assert!(s.chart.patch.mesh.topology().is_chart());
             assert!(s.pieces.len() == 1 || s.chart.l2 <= settings.stretch_limit);

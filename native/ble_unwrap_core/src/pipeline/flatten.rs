@@ -9,10 +9,11 @@ use crate::distortion::{self, RestTriangle};
 use crate::embedding::{self, EmbeddingError, Model};
 use crate::geodesics::LandmarkDistances;
 use crate::mesh::FaceId;
-use crate::progress::{Cancelled, Progress};
+use crate::progress::Cancelled;
 use crate::settings::Settings;
 use crate::stretch::{self, BOUNDARY_REACH, Minimised, StretchError};
 
+use super::memo::{Fingerprint, Kind, Run};
 use super::rungs::{Rung, Rungs};
 use super::steps::Steps;
 
@@ -35,6 +36,13 @@ const HOPELESS_START: f64 = 4.0;
 
 /// A patch whose faces all lean less than 70° from their mean normal is flattened from its projection.
 const MOST_LEANING: f64 = 70.0;
+
+/// A position in the plane for each vertex.
+type Start = Vec<Point2<f64>>;
+
+fn bytes_of_start(start: &Option<Start>) -> usize {
+    16 * start.as_ref().map_or(0, Vec::len)
+}
 
 /// A patch flattened without flips and without overlap.
 pub(super) struct Flat {
@@ -81,7 +89,7 @@ pub(super) fn flatten(
     distances: &LandmarkDistances,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Option<Flat>, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
     recover(trial.flatten(distances, Some(settings.stretch_limit), rungs))
@@ -94,7 +102,7 @@ pub(super) fn projected(
     patch: &Patch,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Option<Option<Flat>>, Cancelled> {
     let Some(start) = embedding::project(&patch.mesh, MOST_LEANING) else { return Ok(None) };
     if stretch::first_flip(&patch.mesh, &start).is_some() || !stretch::boundary_is_simple(&patch.mesh, &start) {
@@ -119,7 +127,7 @@ pub(super) fn polish(
     rung: Rung,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Option<Flat>, Cancelled> {
     if let Some(flat) = isometric(patch, rungs) {
         return Ok(Some(flat));
@@ -135,7 +143,7 @@ pub(super) fn flatten_polygon(
     distances: &LandmarkDistances,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Flat, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
     if let Some(flat) = recover(trial.flatten(distances, None, rungs))? {
@@ -151,7 +159,7 @@ pub(super) fn flatten_apart(
     patch: &Patch,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Option<Flat>, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
     recover(trial.flatten_apart(Some(settings.stretch_limit), rungs))
@@ -199,14 +207,17 @@ enum Free {
 /// The steps on one patch under a limit: the work stops as soon as that is out of reach.
 struct Trial<'a> {
     patch: &'a Patch,
+    settings: &'a Settings,
+    seed: u64,
     steps: Steps<'a>,
+    run: &'a Run<'a>,
 }
 
 impl<'a> Trial<'a> {
-    fn new(patch: &'a Patch, settings: &'a Settings, progress: &'a Progress) -> Self {
+    fn new(patch: &'a Patch, settings: &'a Settings, progress: &'a Run<'a>) -> Self {
         // The same for a patch whatever else the surface holds.
         let seed = settings.seed ^ patch.faces.first().map_or(0, |f| f.index() as u64);
-        Self { patch, steps: Steps::new(&patch.mesh, settings, seed, progress) }
+        Self { patch, settings, seed, steps: Steps::new(&patch.mesh, settings, seed, progress), run: progress }
     }
 
     fn flatten(
@@ -222,7 +233,7 @@ impl<'a> Trial<'a> {
             }
             let cleared = match limit {
                 // Of 29 trials on a body that Tutte's embedding had to save one came under the limit.
-                Some(_) => self.steps.clear_flips(&start)?,
+                Some(_) => self.recall_start(Kind::Cleared, &start, || self.steps.clear_flips(&start))?,
                 None => Some(self.steps.remove_flips(&start)?),
             };
             let Some((uv, rung)) = cleared else { return Ok(None) };
@@ -250,10 +261,12 @@ impl<'a> Trial<'a> {
         if self.folded_share(start) > MOST_FOLDED {
             return Ok(None);
         }
-        let Some(mut uv) = self.steps.clear_locally(start)? else { return Ok(None) };
+        let cleared = self.recall_start(Kind::LocallyCleared, start, || self.steps.clear_locally(start))?;
+        let Some(mut uv) = cleared else { return Ok(None) };
         rungs.take(if uv == start { rung } else { Rung::FoldoverFree });
         if !self.steps.boundary_is_simple(&uv) {
-            let Some(parted) = self.steps.part_boundary(&uv)? else { return Ok(None) };
+            let parted = self.recall_start(Kind::Parted, &uv, || self.steps.part_boundary(&uv))?;
+            let Some(parted) = parted else { return Ok(None) };
             uv = parted;
         }
         if !self.steps.boundary_is_tight(&uv) {
@@ -288,13 +301,41 @@ impl<'a> Trial<'a> {
     }
 
     /// `None` where the distances do not span a plane; Tutte needs none.
-    fn embed(&self, distances: &LandmarkDistances) -> Result<Option<Vec<Point2<f64>>>, Cancelled> {
-        let all = self.steps.distances_of_all()?;
-        match self.steps.embed(all.as_ref().unwrap_or(distances)) {
-            Ok(embedded) => Ok(Some(embedded.uv)),
-            Err(EmbeddingError::Cancelled(c)) => Err(c),
-            Err(_) => Ok(None),
-        }
+    fn embed(&self, distances: &LandmarkDistances) -> Result<Option<Start>, Cancelled> {
+        let input = |f: &mut Fingerprint| {
+            f.mesh(self.steps.mesh);
+            f.distances(distances);
+            f.settings(&(&self.settings.embedding, &self.settings.geodesics, self.settings.together_max, self.seed));
+        };
+        let embedded = self.run.recall(Kind::Embedding, input, bytes_of_start, || {
+            let all = self.steps.distances_of_all()?;
+            match self.steps.embed(all.as_ref().unwrap_or(distances)) {
+                Ok(embedded) => Ok(Some(embedded.uv)),
+                Err(EmbeddingError::Cancelled(c)) => Err(c),
+                Err(_) => Ok(None),
+            }
+        })?;
+        Ok((*embedded).clone())
+    }
+
+    /// What a step that removes flips or overlap makes of a start; refused ones and those that a solver fails on are kept,
+    /// too.
+    fn recall_start<T: Clone + Send + Sync + 'static>(
+        &self,
+        kind: Kind,
+        start: &[Point2<f64>],
+        step: impl FnOnce() -> Result<Option<T>, StretchError>,
+    ) -> Result<Option<T>, StretchError> {
+        let input = |f: &mut Fingerprint| {
+            f.mesh(self.steps.mesh);
+            f.points(start);
+        };
+        let bytes = |_: &Result<Option<T>, StretchError>| 16 * start.len();
+        let known = self.run.recall(kind, input, bytes, || match step() {
+            Err(StretchError::Cancelled(c)) => Err(StretchError::Cancelled(c)),
+            other => Ok(other),
+        })?;
+        (*known).clone()
     }
 
     /// Share of the surface that a map turns over.
@@ -312,8 +353,25 @@ impl<'a> Trial<'a> {
         abandon_above: Option<f64>,
         keep_apart: Option<f64>,
     ) -> Result<Option<Minimised>, StretchError> {
-        let best = self.steps.minimise(start, abandon_above, keep_apart)?;
-        Ok((!best.abandoned).then_some(best))
+        let input = |f: &mut Fingerprint| {
+            f.mesh(self.steps.mesh);
+            f.points(start);
+            f.reals(keep_apart);
+            f.settings(&(&self.settings.stretch, self.seed));
+        };
+        let given_up = |best: &Minimised| abandon_above.is_some_and(|limit| limit < best.abandoned_below);
+        // One that was given up tells nothing about limits that it would have gone on under.
+        let will_do = |best: &Minimised| !best.abandoned || given_up(best);
+        let bytes = |best: &Minimised| 16 * best.uv.len();
+        let minimise = || {
+            let mut best = self.steps.minimise(start, abandon_above, keep_apart)?;
+            if best.abandoned {
+                best.uv = Vec::new();
+            }
+            Ok::<_, StretchError>(best)
+        };
+        let best = self.run.recall_if(Kind::Minimum, input, will_do, bytes, minimise)?;
+        Ok((!given_up(&best)).then(|| (*best).clone()))
     }
 
     fn judge(&self, uv: Vec<Point2<f64>>, limit: Option<f64>) -> Option<Flat> {

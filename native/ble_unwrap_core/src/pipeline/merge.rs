@@ -7,10 +7,11 @@ use rayon::prelude::*;
 
 use crate::charts::Chart;
 use crate::mesh::{HalfedgeId, TriMesh};
-use crate::progress::{Cancelled, Progress};
+use crate::progress::Cancelled;
 use crate::settings::Settings;
 
 use super::charting::Charting;
+use super::memo::Run;
 use super::rungs::{Rung, Rungs};
 use super::sew;
 
@@ -46,7 +47,7 @@ impl Candidate {
     }
 }
 
-/// Joins neighbouring charts, longest shared border over √(smaller area) first, as long as the union
+/// Joins neighbouring charts, longest shared border over √(smaller area) first (guides count little), as long as the union
 /// is under the limit. Each chart takes part in at most [`MOST_FAILURES`] failed tests, so the number of
 /// tests is linear in the number of charts. Two halves of a split in two are not tried: their union has
 /// already been refused.
@@ -56,7 +57,7 @@ pub(super) fn merge(
     charting: Charting,
     which: Which,
     settings: &Settings,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<(Vec<Chart>, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
     let family = charting.family;
@@ -144,7 +145,7 @@ fn borders(mesh: &TriMesh, owner: &[usize], pool: &[Option<Candidate>], which: W
         let (a, b) = (a.min(b), a.max(b));
         let refused = || pool[a].as_ref().is_some_and(|c| c.refused.contains(&b));
         (a != b && b != usize::MAX && wanted(a, b) && open(a) && open(b) && !refused())
-            .then(|| (a, b, mesh.edge_length(h)))
+            .then(|| (a, b, mesh.edge_length(h) * mesh.border_cost(h)))
     };
     let mut sides: Vec<(usize, usize, f64)> = mesh.halfedges().filter_map(shared).collect();
     sides.sort_by_key(|s| (s.0, s.1));

@@ -8,10 +8,11 @@ use nalgebra::{Point2, Rotation2, Vector2};
 
 use crate::charts::{Chart, Patch};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
-use crate::progress::{Cancelled, Progress};
+use crate::progress::Cancelled;
 use crate::settings::{Holes, Settings};
 
 use super::flatten;
+use super::memo::Run;
 use super::rungs::{Rung, Rungs};
 
 /// The charts' vertices share what is left of the gap over about the root of so many rings.
@@ -26,7 +27,7 @@ pub(super) fn joined(
     [a, b]: [&Chart; 2],
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Option<Chart>, Cancelled> {
     let sides = Sides { mesh, a: Side::new(a), b: Side::new(b) };
     let stretches = sides.stretches();

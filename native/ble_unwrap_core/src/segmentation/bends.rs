@@ -16,18 +16,21 @@ const WIDEST: f64 = 100.0;
 pub(super) struct Bends {
     first: Vec<usize>,
     bend: Vec<f64>,
+    /// What a border costs on a side besides: less on a guide.
+    guidance: Vec<f64>,
     /// Length of the side over the distance between the middles of its two polygons.
     width: Vec<f64>,
     mean_bend: f64,
+    crease_weight: f64,
     /// Mean length of a side, above 0.
     pub(super) mean_length: f64,
 }
 
 impl Bends {
-    pub(super) fn new(mesh: &TriMesh, graph: &PolygonGraph) -> Self {
+    pub(super) fn new(mesh: &TriMesh, graph: &PolygonGraph, crease_weight: f64) -> Self {
         let normals = measure::face_normals(mesh);
         let mut first = Vec::with_capacity(graph.len());
-        let (mut bend, mut width) = (Vec::new(), Vec::new());
+        let (mut bend, mut guidance, mut width) = (Vec::new(), Vec::new(), Vec::new());
         let middle: Vec<Point3<f64>> = graph.faces.iter().map(|faces| middle(mesh, faces)).collect();
         let (mut sum_bend, mut sum_length) = (0.0, 0.0);
         for (p, links) in graph.links.iter().enumerate() {
@@ -38,18 +41,22 @@ impl Bends {
                 sum_bend += d * link.length;
                 sum_length += link.length;
                 bend.push(d);
+                guidance.push(mesh.border_cost(link.halfedge));
                 let apart = (middle[link.to as usize] - middle[p]).norm();
                 width.push(if apart > 0.0 { (link.length / apart).min(WIDEST) } else { WIDEST });
             }
         }
         let mean = |sum: f64, n: f64| if n > 0.0 { sum / n } else { 0.0 };
         let mean_bend = mean(sum_bend, sum_length).max(f64::MIN_POSITIVE);
-        Self { first, width, mean_bend, mean_length: mean(sum_length, bend.len() as f64).max(f64::MIN_POSITIVE), bend }
+        let mean_length = mean(sum_length, bend.len() as f64).max(f64::MIN_POSITIVE);
+        Self { first, bend, guidance, width, mean_bend, crease_weight, mean_length }
     }
 
-    /// Cost of cutting along side `k` of polygon `p`: 1 where the surface is flat, near 0 at a crease.
+    /// Cost of cutting along side `k` of polygon `p`: 1 where the surface is flat, near 0 at a crease, and on a guide a
+    /// share of that. With w the crease weight: 1/(1 + d/mean)ʷ.
     pub(super) fn crease(&self, p: usize, k: usize) -> f64 {
-        1.0 / (1.0 + self.bend[self.first[p] + k] / self.mean_bend)
+        let side = self.first[p] + k;
+        self.guidance[side] * (1.0 + self.bend[side] / self.mean_bend).powf(-self.crease_weight)
     }
 
     /// How well a value spreads over side `k` of polygon `p`: as heat does over two plates that meet there, and badly

@@ -221,7 +221,7 @@ mod tests {
         let graph = PolygonGraph::new(mesh, &polygon);
         let start: Vec<u32> = mesh.faces().map(|f| label(centre(mesh, f))).collect();
         let mut end = start.clone();
-        smooth(&graph, &Bends::new(mesh, &graph), &mut end, rings, &Progress::new()).expect("not cancelled");
+        smooth(&graph, &Bends::new(mesh, &graph, 1.0), &mut end, rings, &Progress::new()).expect("not cancelled");
         (start, end)
     }
 

@@ -42,7 +42,14 @@ pub(super) fn minimise(
     let area = surface_area(rest);
     let mut uv = start.to_vec();
     let mut sums = total(mesh, rest, &uv);
-    let mut result = Minimised { uv: Vec::new(), l2: 0.0, iterations: 0, abandoned: false, converged: false };
+    let mut result = Minimised {
+        uv: Vec::new(),
+        l2: 0.0,
+        iterations: 0,
+        abandoned: false,
+        abandoned_below: f64::NEG_INFINITY,
+        converged: false,
+    };
     for sweep in 0..settings.max_iterations {
         let before = (sums.energy * sums.area).sqrt();
         let saved = options.keep_apart.map(|_| uv.clone());
@@ -63,9 +70,12 @@ pub(super) fn minimise(
         }
         // Sweeps gain ever less: as for Newton, but over as many sweeps as are left.
         let left = (settings.max_iterations - sweep - 1) as f64;
-        if options.abandon_above.is_some_and(|limit| sweep >= 1 && (after - left * (before - after)) / area > limit) {
-            result.abandoned = true;
-            break;
+        if sweep >= 1 {
+            result.abandoned_below = result.abandoned_below.max((after - left * (before - after)) / area);
+            if options.abandon_above.is_some_and(|limit| limit < result.abandoned_below) {
+                result.abandoned = true;
+                break;
+            }
         }
     }
     result.l2 = (sums.energy * sums.area).sqrt() / area;

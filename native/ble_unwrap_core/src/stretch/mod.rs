@@ -111,6 +111,9 @@ pub struct Minimised {
     pub iterations: usize,
     /// Whether it was given up because of [`MinimiseOptions::abandon_above`].
     pub abandoned: bool,
+    /// Under any limit below this it would have been given up, sooner or now, and under no other so far: −∞ where it came
+    /// to rest before anything could be told.
+    pub abandoned_below: f64,
     /// Whether the last iteration gained less than the tolerance.
     pub converged: bool,
 }

@@ -70,7 +70,14 @@ pub(super) fn minimise(
     let warm = StretchEnergy::new(settings.dirichlet_weight.max(0.5));
     relax_worst(mesh, rest, &mut uv, &warm, options.keep_apart.is_some(), progress)?;
     let mut descent = Descent::new(mesh, rest, uv, Vec::new(), options.keep_apart)?;
-    let mut result = Minimised { uv: Vec::new(), l2: 0.0, iterations: 0, abandoned: false, converged: false };
+    let mut result = Minimised {
+        uv: Vec::new(),
+        l2: 0.0,
+        iterations: 0,
+        abandoned: false,
+        abandoned_below: f64::NEG_INFINITY,
+        converged: false,
+    };
     let mut l2 = descent.system.stretch_sums(&descent.uv).l2();
     let tolerance = if descent.barrier.is_some() { APART_TOLERANCE } else { 1.0 } * settings.tolerance;
     for iteration in 0..settings.max_iterations {
@@ -90,11 +97,13 @@ pub(super) fn minimise(
             break;
         }
         let gain = (l2_before - l2).max(0.0);
-        let far = |limit: f64| iteration >= FAR_AFTER && l2 > FAR * limit;
-        let out_of_reach = |limit: f64| l2 - ABANDON_GAINS * gain > limit || far(limit);
-        if iteration >= ABANDON_AFTER && options.abandon_above.is_some_and(out_of_reach) {
-            result.abandoned = true;
-            break;
+        if iteration >= ABANDON_AFTER {
+            let far = if iteration >= FAR_AFTER { l2 / FAR } else { f64::NEG_INFINITY };
+            result.abandoned_below = result.abandoned_below.max(l2 - ABANDON_GAINS * gain).max(far);
+            if options.abandon_above.is_some_and(|limit| limit < result.abandoned_below) {
+                result.abandoned = true;
+                break;
+            }
         }
     }
     result.l2 = l2;
