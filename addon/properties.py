@@ -248,7 +248,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     landmark_min: IntProperty(
         name="At Least",
         description="Fewest landmarks of a chart",
-        default=24,
+        default=48,
         min=3,
         max=100_000,
         soft_max=1000,
@@ -256,7 +256,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     landmark_max: IntProperty(
         name="At Most",
         description="Most landmarks of a chart; 0 sets no bound",
-        default=40,
+        default=64,
         min=0,
         max=100_000,
         soft_max=2000,

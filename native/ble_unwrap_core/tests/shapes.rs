@@ -17,6 +17,7 @@ fn charts(mesh: &PolyMesh, name: &str) -> usize {
         face_offsets: &flat.face_offsets,
         corner_triangles: None,
         seams: &[],
+        guides: &[],
     };
     let atlas = unwrap(&input, &Settings::default(), &Progress::new()).expect("unwraps");
     let count = atlas.chart.iter().max().map_or(0, |c| *c as usize + 1);

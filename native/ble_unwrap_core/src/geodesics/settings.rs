@@ -21,22 +21,13 @@ pub struct GeodesicSettings {
     pub landmark_min: usize,
     /// At most so many landmarks.
     pub landmark_max: usize,
-    /// A part that a patch is split into takes over the distances from the patch's landmarks that lie in it, if they are
-    /// at least so many; else they are measured anew within the part.
-    pub landmark_reuse_min: usize,
 }
 
 impl Default for GeodesicSettings {
     /// The paper's fraction, kept between 48 (fewer lose accuracy on small charts) and 64 (more
     /// gain nothing once stretch is minimised).
     fn default() -> Self {
-        Self {
-            metric: Metric::FastMarching,
-            landmark_fraction: 0.01,
-            landmark_min: 48,
-            landmark_max: 64,
-            landmark_reuse_min: 16,
-        }
+        Self { metric: Metric::FastMarching, landmark_fraction: 0.01, landmark_min: 48, landmark_max: 64 }
     }
 }
 
@@ -44,7 +35,7 @@ impl GeodesicSettings {
     /// The paper's: 1 % of the vertices, however many. Three are needed to span a plane.
     #[must_use]
     pub fn paper() -> Self {
-        Self { landmark_min: 3, landmark_max: usize::MAX, landmark_reuse_min: usize::MAX, ..Self::default() }
+        Self { landmark_min: 3, landmark_max: usize::MAX, ..Self::default() }
     }
 
     /// Number of landmarks for a mesh: ⌈αn⌉ within the bounds, never more than `vertex_count`. A

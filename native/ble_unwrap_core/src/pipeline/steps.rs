@@ -13,6 +13,9 @@ use crate::stretch::{self, Injective, MinimiseOptions, Minimised, StretchError, 
 
 use super::rungs::Rung;
 
+/// A map without flips, and how it was got.
+pub(crate) type Cleared = (Vec<Point2<f64>>, Rung);
+
 /// A patch of genus 0 with a boundary, and what every step needs.
 pub(crate) struct Steps<'a> {
     pub(crate) mesh: &'a TriMesh,
@@ -49,13 +52,13 @@ impl<'a> Steps<'a> {
     }
 
     /// The same map without flips, and how it was got.
-    pub(crate) fn remove_flips(&self, start: &[Point2<f64>]) -> Result<(Vec<Point2<f64>>, Rung), StretchError> {
+    pub(crate) fn remove_flips(&self, start: &[Point2<f64>]) -> Result<Cleared, StretchError> {
         let (uv, how) = stretch::make_injective(self.mesh, &self.rest, start, self.progress)?;
         Ok((uv, rung_of(how)))
     }
 
     /// The same, but `None` where the flips resist.
-    pub(crate) fn clear_flips(&self, start: &[Point2<f64>]) -> Result<Option<(Vec<Point2<f64>>, Rung)>, StretchError> {
+    pub(crate) fn clear_flips(&self, start: &[Point2<f64>]) -> Result<Option<Cleared>, StretchError> {
         let cleared = stretch::clear_flips(self.mesh, &self.rest, start, self.progress)?;
         Ok(cleared.map(|(uv, how)| (uv, rung_of(how))))
     }

@@ -214,7 +214,14 @@ mod tests {
             border.len() == 20 && border.iter().all(|h| at_fold(h) && mesh.position(mesh.from(*h)).z.abs() < 1e-9)
         };
         assert!(on_fold(&run(1.0).label) && on_fold(&run(2.0).label));
-        assert!(!on_fold(&run(0.0).label), "where folds count nothing, every column is as good");
+        let graph = PolygonGraph::new(&mesh, &polygon);
+        let creases = |weight| {
+            let bends = Bends::new(&mesh, &graph, weight);
+            let all = (0..graph.len()).flat_map(|p| (0..graph.links.group(p).len()).map(move |k| (p, k)));
+            all.map(|(p, k)| bends.crease(p, k)).collect::<Vec<f64>>()
+        };
+        assert!(creases(0.0).iter().all(|c| *c == 1.0), "folds count nothing");
+        assert!(creases(1.0).iter().zip(creases(2.0)).all(|(once, twice)| (once * once - twice).abs() < 1e-12));
     }
 
     #[test]

@@ -34,6 +34,9 @@ pub enum Injective {
     TutteCircle,
 }
 
+/// A point a vertex, without flips, and how they were got.
+pub type InjectiveMap = (Vec<Point2<f64>>, Injective);
+
 /// A map near `start` (a point a vertex, in about surface units) with all triangles strictly positive by an exact test, and how
 /// it was got.
 ///
@@ -51,7 +54,7 @@ pub fn make_injective(
     rest: &[RestTriangle],
     start: &[Point2<f64>],
     progress: &Progress,
-) -> Result<(Vec<Point2<f64>>, Injective), StretchError> {
+) -> Result<InjectiveMap, StretchError> {
     assert_eq!(
         (rest.len(), start.len()),
         (mesh.face_count(), mesh.vertex_count()),
@@ -87,7 +90,7 @@ pub fn clear_flips(
     rest: &[RestTriangle],
     start: &[Point2<f64>],
     progress: &Progress,
-) -> Result<Option<(Vec<Point2<f64>>, Injective)>, StretchError> {
+) -> Result<Option<InjectiveMap>, StretchError> {
     progress.check()?;
     if first_flip(mesh, start).is_none() {
         let better = clear_locally(mesh, rest, start, progress)?;

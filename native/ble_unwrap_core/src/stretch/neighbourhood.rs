@@ -33,7 +33,7 @@ impl Neighbourhood {
         let at_edge = |v: &VertexId| mesh.outgoing(*v).any(|h| !near[h.face().index()]);
         Self {
             mesh: part,
-            rest: faces.iter().map(|f| rest[f.index()].clone()).collect(),
+            rest: faces.iter().map(|f| rest[f.index()]).collect(),
             pinned: vertices.iter().map(at_edge).collect(),
             vertices,
         }
