@@ -1,8 +1,11 @@
 # make test   everything: Rust, the wheel, Python without Blender, the add-on in every bpy that can be had
 # make demo   unwrap the demonstration meshes and compare with Smart UV Project: out/
+# make bench  times of the stages; make flamegraph where the time of one unwrap goes; make scaling time and memory against faces
+# make contact-sheet  every model under a checker beside its layout, in one picture: out/contact_sheet.png
 # make paper  the paper's figures and its comparison with Isomap, measured anew: out/paper/ and native/paper/
-# Knobs: PYTHON (3.11 or later), CARGO, MESH=file for the demo, BLENDER=/path/to/blender for a real one instead of bpy,
-# MODELS="a.obj b.obj" for the paper's figure 3 and its table.
+# Knobs: PYTHON (3.11 or later), CARGO, MESH=file for the demo and the flame graph (.obj), BLENDER=/path/to/blender for a
+# real one instead of bpy, MODELS="a.obj b.obj" for the paper's figure 3 and its table, for the scaling (.ply, .ply.gz, too)
+# and for the contact sheet, COMPARE=smart for a third picture a model there.
 
 PYTHON ?= python3
 CARGO ?= cargo
@@ -12,7 +15,8 @@ WHEELS := addon/wheels
 # What the wheel is made of. Official Blender runs on glibc 2.28, which zig links against on any newer system.
 NATIVE := Cargo.toml Cargo.lock $(shell find native -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' 2>/dev/null)
 
-.PHONY: test test-rust test-python test-blender bench lint format venv wheel zip demo paper clean
+.PHONY: test test-rust test-python test-blender bench flamegraph scaling contact-sheet lint format venv wheel zip demo \
+	paper clean
 
 test: test-rust lint test-python test-blender
 
@@ -22,9 +26,20 @@ test-rust:
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --workspace --no-deps --locked --document-private-items
 	$(CARGO) test --locked
 
-# Figures and what they mean: native/ble_unwrap_core/benches/README.md. BENCH=embedding/face/1000 runs one.
+# Figures and what they mean: native/ble_unwrap_core/benches/README.md. BENCH=unwrap/sculpt/972 runs one, BENCH=pack one stage.
 bench:
 	$(CARGO) bench --locked -p ble_unwrap_core --bench main -- $(BENCH)
+
+# Needs no perf and no rights: the process samples itself.
+flamegraph:
+	$(CARGO) run --release --locked -p ble_unwrap_core --example flamegraph -- out/flamegraph.svg $(MESH)
+
+scaling: $(VENV)/.wheel $(VENV)/.scaling
+	$(BIN)/python .ci/scaling $(MODELS)
+
+contact-sheet: zip
+	.ci/blender_libraries
+	$(PYTHON) .ci/contact_sheet $(MODELS) $(if $(COMPARE),--compare $(COMPARE))
 
 test-python: $(VENV)/.wheel
 	$(BIN)/python -m pytest tests --ignore=tests/blender
@@ -66,6 +81,10 @@ $(VENV)/.ready: .ci/requirements.txt
 
 $(VENV)/.paper: .ci/paper_requirements.txt $(VENV)/.ready
 	$(BIN)/pip install --quiet --disable-pip-version-check -r .ci/paper_requirements.txt
+	touch $@
+
+$(VENV)/.scaling: .ci/scaling_requirements.txt $(VENV)/.ready
+	$(BIN)/pip install --quiet --disable-pip-version-check -r .ci/scaling_requirements.txt
 	touch $@
 
 $(WHEELS)/.built: $(NATIVE) $(VENV)/.ready

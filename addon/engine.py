@@ -1,5 +1,6 @@
 """Settings and arrays in, plain results out: alone imports `ble_unwrap_native`, and knows nothing of Blender."""
 
+import hashlib
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -88,15 +89,53 @@ def native_settings(settings):
     return result
 
 
-def _arguments(selection, settings, use_seams):
+def _mesh(selection, cut, follow):
+    """The arrays of a mesh, by position and by name. `cut` and `follow` are kinds of marked edges."""
     return (
         (selection.positions, selection.corner_vertices, selection.face_offsets),
         {
             "corner_triangles": selection.corner_triangles,
-            "seams": selection.seams if use_seams and len(selection.seams) else None,
-            **native_settings(settings),
+            "seams": selection.marked(cut),
+            "guides": selection.marked(follow),
         },
     )
+
+
+class _Kept:
+    """The analysis of the mesh that was unwrapped last: with other settings it is unwrapped again in less time."""
+
+    key = analysis = None
+
+
+def forget():
+    """Frees what `keep` keeps."""
+    _Kept.key = _Kept.analysis = None
+
+
+def _analysis(mesh, weld, threads):
+    """The kept analysis if it is of this mesh, else a new one in its place."""
+    positional, named = mesh
+    digest = hashlib.blake2b(digest_size=16)
+    for array in (*positional, *named.values()):
+        values = np.ascontiguousarray(array if array is not None else ()).reshape(-1)
+        digest.update(f"{values.dtype} {values.shape} ".encode())
+        digest.update(values.view(np.uint8))
+    key = digest.digest(), weld
+    if _Kept.key != key:
+        forget()
+        _Kept.analysis = _translated(lambda module: module.analyse(*positional, **named, weld=weld, threads=threads))
+        _Kept.key = key
+    return _Kept.analysis
+
+
+def _caller(name, mesh, settings, keep):
+    """A call of the function `name` of the native module, or where the analysis is kept of its method."""
+    settings = native_settings(settings)
+    if keep:
+        weld = settings.pop("weld", False)
+        analysis = _analysis(mesh, weld, settings.get("threads", 0))
+        return lambda module: getattr(analysis, name)(**settings)
+    return lambda module: getattr(module, name)(*mesh[0], **mesh[1], **settings)
 
 
 def _translated(call, *arguments, **keywords):
@@ -116,10 +155,13 @@ def _result(atlas):
     return Result(np.asarray(atlas.uv, np.float32), np.asarray(atlas.chart, np.int32), dict(atlas.report))
 
 
-def unwrap(selection, settings, *, use_seams=False):
-    """Unwraps at once. Raises `EngineMissing`, `EngineError`."""
-    positional, keywords = _arguments(selection, settings, use_seams)
-    return _result(_translated(lambda module: module.unwrap(*positional, **keywords)))
+def unwrap(selection, settings, *, cut=(), follow=(), keep=False):
+    """Unwraps at once. Raises `EngineMissing`, `EngineError`.
+
+    `cut` and `follow` are kinds of marked edges: all cut, or where borders are drawn to. With `keep`, the analysis of
+    the mesh is kept for the next call, until another mesh's is or `forget` is called.
+    """
+    return _result(_translated(_caller("unwrap", _mesh(selection, cut, follow), settings, keep)))
 
 
 def unwrap_points(positions, settings):
@@ -127,10 +169,9 @@ def unwrap_points(positions, settings):
     return _result(_translated(lambda module: module.unwrap_points(positions, **native_settings(settings))))
 
 
-def submit_unwrap(selection, settings, *, use_seams=False):
-    """Unwraps on another thread: a `Job`. Raises `EngineMissing`, `EngineError`."""
-    positional, keywords = _arguments(selection, settings, use_seams)
-    return Job(_translated(lambda module: module.submit_unwrap(*positional, **keywords)))
+def submit_unwrap(selection, settings, *, cut=(), follow=(), keep=False):
+    """As `unwrap`, on another thread: a `Job`. Raises `EngineMissing`, `EngineError`."""
+    return Job(_translated(_caller("submit_unwrap", _mesh(selection, cut, follow), settings, keep)))
 
 
 def submit_unwrap_points(positions, settings):
@@ -198,7 +239,7 @@ def measure(selection, uv, *, texture_size, margin, weld=True):
     )
 
 
-def certify(measured, *, margin, stretch_limit=None, warnings=()):
+def certify(measured, *, margin, stretch_limit=None, limit_over="CHART", warnings=()):
     """Judges a measurement against what was promised."""
     certificate = Certificate(measured, warnings=list(warnings))
     if measured.get("overlaps"):
@@ -210,10 +251,17 @@ def certify(measured, *, margin, stretch_limit=None, warnings=()):
     gap = measured.get("gap_texels")
     if gap is not None and np.isfinite(gap) and measured.get("charts", 0) > 1 and gap < margin - MARGIN_SLACK_TEXELS:
         certificate.violations.append(f"charts {gap:.2f} px apart, margin is {margin:g} px")
-    worst = measured.get("l2_worst_chart")
-    if stretch_limit is not None and worst is not None and worst > stretch_limit + STRETCH_SLACK:
-        certificate.violations.append(f"worst chart has stretch {worst:.3f}, limit is {stretch_limit:g}")
+    limited, name = _limited(measured, limit_over)
+    if stretch_limit is not None and limited is not None and limited > stretch_limit + STRETCH_SLACK:
+        certificate.violations.append(f"{name} has stretch {limited:.3f}, limit is {stretch_limit:g}")
     return certificate
+
+
+def _limited(measured, limit_over):
+    """The stretch that the limit is for, and whose it is."""
+    if limit_over == "ATLAS":
+        return measured.get("l2_chart_scale"), "the atlas"
+    return measured.get("l2_worst_chart"), "worst chart"
 
 
 def summary(measured, seconds=None):
@@ -231,12 +279,13 @@ def summary(measured, seconds=None):
     return ", ".join(parts)
 
 
-def lines(certificate, *, margin, stretch_limit):
+def lines(certificate, *, margin, stretch_limit, limit_over="CHART"):
     """The certificate for display: (status, text), status one of OK, BAD, WARN, INFO."""
     measured = certificate.measured
     charts = int(measured.get("charts") or 0)
     worst, gap = measured.get("l2_worst_chart"), measured.get("gap_texels")
-    stretch_ok = worst is not None and worst <= stretch_limit + STRETCH_SLACK
+    limited, _ = _limited(measured, limit_over)
+    stretch_ok = limited is not None and limited <= stretch_limit + STRETCH_SLACK
     gap_ok = charts < 2 or gap is None or gap >= margin - MARGIN_SLACK_TEXELS
     overlaps, flips, unmapped = (int(measured.get(key) or 0) for key in ("overlaps", "flips", "unmapped_faces"))
     result = [

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
+MARKS = ("seams", "sharp", "materials")  # what an artist marks edges by
 MAX_UV_MAPS = 8  # Blender's own limit
 SCALE_TOLERANCE = 1e-3  # relative difference of an object's axes from which its scale counts as non-uniform
 
@@ -47,8 +48,13 @@ class Selection:
     corner_vertices: np.ndarray  # (c,) int32
     face_offsets: np.ndarray  # (f + 1,) int32
     corner_triangles: np.ndarray | None  # (t, 3) int32 corners; None: only triangles
-    seams: np.ndarray  # (s, 2) int32 vertices
+    marks: dict[str, np.ndarray]  # of each kind in MARKS the edges that have it, (m, 2) int32 vertices
     warnings: list[str] = field(default_factory=list)
+
+    def marked(self, kinds):
+        """The edges of these kinds, (m, 2) int32 vertices; None where there are none."""
+        edges = np.concatenate([self.marks[kind] for kind in kinds]) if kinds else ()
+        return edges if len(edges) else None
 
     @property
     def title(self):
@@ -108,7 +114,7 @@ def gather(objects, *, only_selected=False, make_new_map=False):
                 block["corner_vertices"] + vertex_base,
                 block["face_sizes"],
                 block["triangles"] + corner_base,
-                block["seams"] + vertex_base,
+                *(block["marks"][kind] + vertex_base for kind in MARKS),
             )
         )
         vertex_base += len(positions)
@@ -119,7 +125,7 @@ def gather(objects, *, only_selected=False, make_new_map=False):
         raise NothingToUnwrap("No faces are selected" if chosen else "There are no faces to unwrap")
     if max(vertex_base, corner_base) > np.iinfo(np.int32).max:
         raise MeshError("The selection is too large: more than two thousand million corners")
-    positions, corner_vertices, sizes, triangles, seams = (
+    positions, corner_vertices, sizes, triangles, *marks = (
         np.concatenate(column) for column in zip(*blocks, strict=True)
     )
     offsets = np.zeros(len(sizes) + 1, np.int32)
@@ -130,7 +136,7 @@ def gather(objects, *, only_selected=False, make_new_map=False):
         corner_vertices=np.ascontiguousarray(corner_vertices, np.int32),
         face_offsets=offsets,
         corner_triangles=None if (sizes == 3).all() else np.ascontiguousarray(triangles, np.int32),
-        seams=np.ascontiguousarray(seams, np.int32),
+        marks={kind: np.ascontiguousarray(edges, np.int32) for kind, edges in zip(MARKS, marks, strict=True)},
         warnings=warnings,
     )
 
@@ -178,8 +184,7 @@ def read_mesh(mesh, only_selected):
     corner_vertices = read_corner_vertices(mesh)
     offsets = read_face_offsets(mesh)
     sizes = np.diff(offsets)
-    edges = read_array(mesh.edges, "vertices", np.int32, 2)
-    seams = edges[read_array(mesh.edges, "use_seam", bool)]
+    marks = read_marks(mesh, sizes)
     mesh.calc_loop_triangles()
     triangles = read_array(mesh.loop_triangles, "loops", np.int32, 3)
     source_faces = source_corners = None
@@ -196,7 +201,9 @@ def read_mesh(mesh, only_selected):
             vertex_chosen = np.zeros(len(positions), bool)
             vertex_chosen[corner_vertices] = True
             corner_vertices = renumber(corner_vertices, vertex_chosen)
-            seams = renumber(seams[vertex_chosen[seams].all(axis=1)], vertex_chosen)
+            marks = {
+                kind: renumber(edges[vertex_chosen[edges].all(axis=1)], vertex_chosen) for kind, edges in marks.items()
+            }
             positions = positions[vertex_chosen]
             sizes = sizes[source_faces]
     return {
@@ -204,10 +211,29 @@ def read_mesh(mesh, only_selected):
         "corner_vertices": corner_vertices,
         "face_sizes": sizes,
         "triangles": triangles,
-        "seams": seams,
+        "marks": marks,
         "source_faces": source_faces,
         "source_corners": source_corners,
     }
+
+
+def read_marks(mesh, face_sizes):
+    """The edges of each kind in `MARKS` as pairs of vertices: seams, sharp edges, borders of materials."""
+    edges = read_array(mesh.edges, "vertices", np.int32, 2)
+    marks = {
+        "seams": edges[read_array(mesh.edges, "use_seam", bool)],
+        "sharp": edges[read_array(mesh.edges, "use_edge_sharp", bool)],
+        "materials": edges[:0],
+    }
+    if len(mesh.materials) > 1:
+        corner_edges = read_array(mesh.loops, "edge_index", np.int32)
+        material = np.repeat(read_array(mesh.polygons, "material_index", np.int32), face_sizes)
+        any_of = np.zeros(len(edges), np.int32)
+        any_of[corner_edges] = material
+        border = np.zeros(len(edges), bool)
+        border[corner_edges[material != any_of[corner_edges]]] = True
+        marks["materials"] = edges[border]
+    return marks
 
 
 def renumber(indices, chosen):

@@ -30,6 +30,8 @@ def panel_settings(settings, context, names):
         left_out.add("uv_map_name")  # a cloud has no active map: its attribute goes by name
     if not surfaces:
         left_out.update(properties.SURFACE_SETTINGS)
+    if settings.use_seams:
+        left_out.add("follow_seams")  # they are all cut
     if not clouds:
         left_out.update(properties.CLOUD_SETTINGS)
     return [name for name in names if name not in left_out]

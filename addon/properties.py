@@ -69,6 +69,19 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         step=1,
         precision=3,
     )
+    limit_over: EnumProperty(
+        name="Limit Over",
+        description="What may not be stretched beyond the limit",
+        items=(
+            ("CHART", "Each Chart", "No chart is stretched beyond the limit"),
+            (
+                "ATLAS",
+                "Whole Atlas",
+                "All charts together keep the limit, some exceed it, up to fourfold above 1: fewer charts",
+            ),
+        ),
+        default="CHART",
+    )
     texture_size: IntVectorProperty(
         name="Texture Size",
         description="Width and height in pixels of the texture that the margin is meant for; need not be square",
@@ -104,6 +117,21 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         name="Keep Seams",
         description="Cut along the seams that the mesh already has, and add only those that the stretch limit needs",
         default=False,
+    )
+    follow_seams: BoolProperty(
+        name="Follow Seams",
+        description="Where a chart needs a border, draw it to seams that the mesh has, without cutting all of them",
+        default=True,
+    )
+    follow_sharp: BoolProperty(
+        name="Follow Sharp Edges",
+        description="Where a chart needs a border, draw it to edges that are marked sharp",
+        default=True,
+    )
+    follow_materials: BoolProperty(
+        name="Follow Materials",
+        description="Where a chart needs a border, draw it to borders between materials",
+        default=True,
     )
     use_selection: BoolProperty(
         name="Only Selected",
@@ -171,6 +199,15 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
             ("STRETCH", "By Stretch", "More pixels where a chart is stretched, between half and double"),
         ),
         default="UNIFORM",
+    )
+    crease_weight: FloatProperty(
+        name="Crease Weight",
+        description="How strongly borders are drawn to folds of the surface; 0 looks at their length alone",
+        default=1.0,
+        min=0.0,
+        max=2.0,
+        step=10,
+        precision=2,
     )
     seed: IntProperty(
         name="Seed",
@@ -326,10 +363,14 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
 
 
 # Settings that the native module never sees.
-BRIDGE_SETTINGS = ("use_seams", "use_selection", "uv_map", "uv_map_name", "use_original_bounds", "mark_seams")
+BRIDGE_SETTINGS = (
+    *("use_seams", "follow_seams", "follow_sharp", "follow_materials", "use_selection"),
+    *("uv_map", "uv_map_name", "use_original_bounds", "mark_seams"),
+)
 # What means something for surfaces only, or for clouds only; the other one's functions do not take it.
 SURFACE_SETTINGS = (
-    *("use_seams", "mark_seams", "weld", "merge", "holes", "chart_scale", "geodesics"),
+    *("use_seams", "follow_seams", "follow_sharp", "follow_materials", "mark_seams"),
+    *("limit_over", "weld", "merge", "holes", "chart_scale", "crease_weight", "geodesics"),
     *("together_max", "stretch_solver", "stretch_iterations"),
 )
 CLOUD_SETTINGS = ("neighbours",)
@@ -338,7 +379,8 @@ CLOUD_SETTINGS = ("neighbours",)
 MAIN_SETTINGS = ("stretch_limit", "texture_size", "margin", "rotation", "use_seams", "use_selection")
 ADVANCED_SETTINGS = (
     ("Result", ("uv_map", "uv_map_name", "use_original_bounds", "mark_seams")),
-    ("Charts", ("neighbours", "weld", "coarse", "merge", "holes", "chart_scale", "seed")),
+    ("Borders", ("follow_seams", "follow_sharp", "follow_materials", "crease_weight")),
+    ("Charts", ("limit_over", "neighbours", "weld", "coarse", "merge", "holes", "chart_scale", "seed")),
     ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max", "together_max")),
     ("Embedding", ("model", "kernel_width", "relaxation", "max_sweeps", "tolerance", "update", "initial")),
     ("Stretch", ("stretch_solver", "stretch_iterations")),

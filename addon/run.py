@@ -14,12 +14,13 @@ SMALL_PARTS_AT_ONCE = 2000
 class Run:
     """Reads all objects when made, then computes (`run` or `start`), then writes (`write`).
 
-    Surfaces share one atlas (`one_atlas=False`: have one each); a cloud has a texture to itself. What has neither faces
-    nor enough points is left out as long as anything else is there, with a note where there are some points. Raises
-    what the tasks raise; whenever it does, nothing was changed.
+    Surfaces share one atlas (`one_atlas=False`: have one each); a cloud has a texture to itself. With `keep`, the
+    analysis of the one atlas is kept for the next run. What has neither faces nor enough points is left out as long as
+    anything else is there, with a note where there are some points. Raises what the tasks raise; whenever it does,
+    nothing was changed.
     """
 
-    def __init__(self, objects, settings, *, threads=0, one_atlas=True):
+    def __init__(self, objects, settings, *, threads=0, one_atlas=True, keep=False):
         settings = {"preset": "DEFAULT", "use_selection": False, **settings}
         for obj in objects:
             if obj.type == "MESH" and obj.mode == "EDIT":
@@ -29,7 +30,7 @@ class Run:
         surfaces = [obj for obj in objects if targets.is_surface(obj)]
         for group in [surfaces] if one_atlas and surfaces else [[obj] for obj in surfaces]:
             try:
-                self.tasks.append(UnwrapTask(group, settings, threads=threads))
+                self.tasks.append(UnwrapTask(group, settings, threads=threads, keep=keep and one_atlas))
             except NothingToUnwrap as error:
                 reasons.append(str(error))
         for obj in filter(targets.is_cloud, objects):

@@ -46,7 +46,7 @@ class UnwrapTask:
     Raises `mesh_bridge.MeshError`, `engine.EngineMissing`, `engine.EngineError`; whenever it does, no mesh was changed.
     """
 
-    def __init__(self, objects, settings, *, threads=0):
+    def __init__(self, objects, settings, *, threads=0, keep=False):
         self.objects = list(objects)
         self.settings = {**properties.default_values(settings.get("preset", "DEFAULT")), **settings}
         self.make_new_map = self.settings["uv_map"] == "NEW"
@@ -55,6 +55,7 @@ class UnwrapTask:
         )
         self.native = properties.native_values(settings, properties.CLOUD_SETTINGS)
         self.native["threads"] = threads
+        self.keep = keep  # the analysis, for the next unwrap of the same meshes
         self.bounds = None
         if self.settings["use_original_bounds"]:
             self._keep_place()
@@ -76,19 +77,19 @@ class UnwrapTask:
     def element_count(self):
         return self.selection.face_count
 
-    @property
-    def use_seams(self):
-        return self.settings["use_seams"]
+    def _call(self, function):
+        cut = ("seams",) if self.settings["use_seams"] else ()
+        follow = [kind for kind in mesh_bridge.MARKS if self.settings[f"follow_{kind}"] and kind not in cut]
+        self.timer.start()
+        return function(self.selection, self.native, cut=cut, follow=follow, keep=self.keep)
 
     def run(self):
         """Computes the result at once."""
-        self.timer.start()
-        return engine.unwrap(self.selection, self.native, use_seams=self.use_seams)
+        return self._call(engine.unwrap)
 
     def start(self):
         """Computes the result on another thread: an `engine.Job`."""
-        self.timer.start()
-        return engine.submit_unwrap(self.selection, self.native, use_seams=self.use_seams)
+        return self._call(engine.submit_unwrap)
 
     def check(self):
         """Raises `mesh_bridge.MeshError` where `write` would: several tasks are written together or not at all."""
@@ -105,7 +106,8 @@ class UnwrapTask:
             map_name=self.settings["uv_map_name"],
             mark_seams=self.settings["mark_seams"],
         )
-        margin, limit = self.settings["margin"], self.settings["stretch_limit"]
+        margin = self.settings["margin"]
+        limit = {name: self.settings[name] for name in ("stretch_limit", "limit_over")}
         measured = result.report
         warnings = [*self.selection.warnings, *result.report.get("warnings", ())]
         if measure_again:
@@ -114,7 +116,7 @@ class UnwrapTask:
                 measured = engine.measure(self.selection, held, texture_size=size, margin=margin, weld=weld)
             except engine.EngineError as error:  # the UVs are written: say what is known
                 warnings.append(f"The written UVs could not be measured: {error}")
-        certificate = engine.certify(measured, margin=margin, stretch_limit=limit, warnings=warnings)
+        certificate = engine.certify(measured, margin=margin, warnings=warnings, **limit)
         seconds = self.timer.seconds()
         return Outcome(
             title=self.selection.title,
@@ -122,7 +124,7 @@ class UnwrapTask:
             report=result.report,
             seconds=seconds,
             summary=engine.summary(measured, seconds),
-            lines=engine.lines(certificate, margin=margin, stretch_limit=limit),
+            lines=engine.lines(certificate, margin=margin, **limit),
             maps=mesh_bridge.active_maps(self.selection),
         )
 

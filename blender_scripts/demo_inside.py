@@ -41,23 +41,8 @@ def render_both(objects, out, name):
     for number, map_name in enumerate((comparison.BLE_MAP, comparison.SMART_MAP)):
         part = out / f".{name}_{number}.png"
         render.render_objects(objects, part, map_name, size=RENDER_SIZE, samples=RENDER_SAMPLES)
-        halves.append(pictures.with_captions(taken(part), [map_name]))
+        halves.append(pictures.with_captions(render.taken(part), [map_name]))
     pictures.write_png(out / f"{name}_render.png", pictures.side_by_side(halves))
-
-
-def taken(path):
-    """The pixels of a picture file as (h, w, 3) uint8; the file is removed."""
-    import bpy
-    import numpy as np
-
-    image = bpy.data.images.load(str(path))
-    image.colorspace_settings.name = "Non-Color"  # the values as they are in the file
-    pixels = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
-    image.pixels.foreach_get(pixels)
-    pixels = pixels.reshape(image.size[1], image.size[0], image.channels)[::-1, :, :3]
-    bpy.data.images.remove(image)
-    path.unlink()
-    return (pixels * 255 + 0.5).astype(np.uint8)
 
 
 def demonstrate_mesh(objects, name, out, options):
@@ -89,7 +74,9 @@ def demonstrate_cloud(cloud, name, out, options):
         atlas = pictures.point_layout(uv, render_points.checker_colours(uv, CLOUD_CELLS), CLOUD_SIZE[1])
         found = outcome.certificate.measured
         captions = [f"{found['points']:,} points, no faces"], [f"{found['charts']} charts, stretch {found['l2']:.3f}"]
-        halves = [pictures.with_captions(half, text) for half, text in zip((taken(part), atlas), captions, strict=True)]
+        halves = [
+            pictures.with_captions(half, text) for half, text in zip((render.taken(part), atlas), captions, strict=True)
+        ]
         pictures.write_png(out / f"{name}_render.png", pictures.side_by_side(halves))
     return {
         **outcome.certificate.measured,

@@ -69,13 +69,14 @@ def is_cloud(obj):
     return addon_loader.load("targets").is_cloud(obj)
 
 
-def place_camera(scene, points, aspect):
-    """A camera that sees all points as large as they fit."""
+def place_camera(scene, points, aspect, view=None):
+    """A camera that sees all points as large as they fit; `view` is where it stands, seen from the model."""
     import bpy
     import mathutils
     import numpy as np
 
-    backward = np.array(VIEW_FROM) / np.linalg.norm(VIEW_FROM)
+    backward = np.array(VIEW_FROM if view is None else view, float)
+    backward /= np.linalg.norm(backward)
     right = np.cross((0.0, 0.0, 1.0), backward)
     right /= np.linalg.norm(right)
     up = np.cross(backward, right)
@@ -126,10 +127,26 @@ def place_lights(scene, camera):
     return key, world
 
 
-def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=16):
+def taken(path):
+    """The pixels of a picture file as (h, w, 3) uint8; the file is removed."""
+    import bpy
+    import numpy as np
+
+    image = bpy.data.images.load(str(path))
+    image.colorspace_settings.name = "Non-Color"  # the values as they are in the file
+    pixels = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(image.size[1], image.size[0], image.channels)[::-1, :, :3]
+    bpy.data.images.remove(image)
+    Path(path).unlink()
+    return (pixels * 255 + 0.5).astype(np.uint8)
+
+
+def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=16, plain=False, view=None):
     """Renders objects through a UV map to a PNG file. Their materials and other objects' visibility are put back.
 
-    Clouds appear as a ball a point, in the colour of a plain checker at the point's UV.
+    `plain` shows a checker without numbers, which small pictures can tell; `view` as for `place_camera`. Clouds appear
+    as a ball a point, in the colour of that checker at the point's UV.
     """
     import addon_utils
     import bpy
@@ -149,7 +166,7 @@ def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=
             obj.data.materials.append(None)
         for slot in obj.material_slots:
             slot.material = material
-    camera = place_camera(scene, world_points(objects), size[0] / size[1])
+    camera = place_camera(scene, world_points(objects), size[0] / size[1], view)
     key, world = place_lights(scene, camera)
     settings = scene.render
     settings.engine = "CYCLES"
@@ -166,6 +183,10 @@ def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=
     scene.cycles.seed = 0
     point_image = render_points.checker_image(cells)
     point_material = render_points.point_material(material, uv_map, point_image)
+    texture = next(node for node in material.node_tree.nodes if node.type == "TEX_IMAGE")
+    grid_image = texture.image
+    if plain:
+        texture.image = point_image
     try:
         with render_points.stand_ins(clouds, point_material, scene):
             bpy.ops.render.render(write_still=True)
@@ -177,7 +198,6 @@ def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=
                 slot.material = old
         for obj, state in hidden.items():
             obj.hide_render = state
-        image = next(node.image for node in material.node_tree.nodes if node.type == "TEX_IMAGE")
         scene.world, scene.camera = old_world, old_camera
         camera_data, key_data = camera.data, key.data
         bpy.data.objects.remove(camera)
@@ -188,7 +208,7 @@ def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=
         bpy.data.materials.remove(material)
         bpy.data.materials.remove(point_material)
         bpy.data.images.remove(point_image)
-        bpy.data.images.remove(image)
+        bpy.data.images.remove(grid_image)
 
 
 def map_names(objects):

@@ -122,6 +122,7 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
             targets.target_objects(context),
             properties.values(self.properties),
             threads=preferences.preference(context, "threads"),
+            keep=True,  # the redo panel unwraps the same meshes again
         )
 
     def _start(self, context, run):
@@ -191,9 +192,18 @@ def redraw(context):
                 area.tag_redraw()
 
 
+@bpy.app.handlers.persistent
+def forget(*_):
+    """Frees the analysis kept for the redo panel: another file is loaded."""
+    engine.forget()
+
+
 def register():
     bpy.utils.register_class(UV_OT_ble_unwrap)
+    bpy.app.handlers.load_post.append(forget)
 
 
 def unregister():
+    bpy.app.handlers.load_post.remove(forget)
+    engine.forget()
     bpy.utils.unregister_class(UV_OT_ble_unwrap)

@@ -3,6 +3,7 @@
 import bpy
 import demo_meshes
 import numpy as np
+import sculpt_mesh
 
 add_mesh = demo_meshes.add_mesh
 
@@ -25,7 +26,7 @@ def cube(name="Cube", size=2.0):
 
 
 def sphere(name="Sphere", cells=8):
-    return add_mesh(name, *demo_meshes.cube_sphere(cells))
+    return add_mesh(name, *sculpt_mesh.cube_sphere(cells))
 
 
 def n_gons(name="N-gons"):

@@ -506,7 +506,17 @@ def test_panel_shows_what_matters(addon):
         select(*objects)
         return set(shown(settings, bpy.context, names))
 
-    for name in ("use_seams", "mark_seams", "weld", "merge", "holes", "geodesics", "stretch_solver"):
+    for name in (
+        "use_seams",
+        "follow_sharp",
+        "limit_over",
+        "mark_seams",
+        "weld",
+        "merge",
+        "holes",
+        "geodesics",
+        "stretch_solver",
+    ):
         assert name in of(surface) and name not in of(loose) and name in of(surface, loose)
     assert "neighbours" in of(loose) and "neighbours" not in of(surface)
     assert "uv_map_name" in of(loose) and "uv_map_name" not in of(surface)

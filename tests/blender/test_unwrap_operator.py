@@ -294,8 +294,103 @@ def test_existing_seams_are_cut_on_request_only():
     unwrap(use_seams=True)
     assert all(is_cut(obj, index) for index in seams)
     assert_good(obj)
-    unwrap(use_seams=False)
+    unwrap(use_seams=False)  # borders may follow them, but there need not be any
     assert not any(is_cut(obj, index) for index in seams)
+
+
+def marked_cap(kind):
+    """A sphere whose upper third is marked off by seams, sharp edges or a material of its own; the edges around it."""
+    obj = sphere()
+    mesh = obj.data
+    slanted = np.array([0.5, 0.3, 0.8])  # along no axis, where borders might be by themselves
+    upper = {face.index for face in mesh.polygons if slanted @ face.center > 0.35}
+    sides = {}
+    for face in mesh.polygons:
+        for key in face.edge_keys:
+            sides.setdefault(key, set()).add(face.index in upper)
+    around = [edge for edge in mesh.edges if len(sides[tuple(sorted(edge.vertices))]) == 2]
+    for edge in around:
+        edge.use_seam, edge.use_edge_sharp = kind == "seams", kind == "sharp"
+    if kind == "materials":
+        for name in ("Lower", "Upper"):
+            mesh.materials.append(bpy.data.materials.new(name))
+        for index in upper:
+            mesh.polygons[index].material_index = 1
+    return obj, [edge.index for edge in around]
+
+
+@pytest.mark.parametrize("kind", ["seams", "sharp", "materials"])
+def test_borders_follow_what_is_marked_unless_told_not_to(kind):
+    obj, around = marked_cap(kind)
+    before = fingerprint(obj)
+    share = {}
+    for follow in (True, False):
+        unwrap(**{f"follow_{kind}": follow})
+        assert_good(obj)
+        share[follow] = sum(is_cut(obj, index) for index in around) / len(around)
+    assert share[True] > 0.9 > 0.6 > share[False], share
+    assert fingerprint(obj) == before
+
+
+def test_marks_of_selected_faces_are_read(addon):
+    obj, around = marked_cap("seams")
+    bridge = addon("mesh_bridge")
+    whole = bridge.gather([obj])
+    assert {kind: len(edges) for kind, edges in whole.marks.items()} == {
+        "seams": len(around),
+        "sharp": 0,
+        "materials": 0,
+    }
+    edit(obj, faces=[face.index for face in obj.data.polygons if face.center.z > -0.7])
+    part = bridge.gather([obj], only_selected=True)
+    ends = [selection.positions[selection.marks["seams"]] for selection in (whole, part)]
+    assert np.array_equal(np.sort(ends[0].reshape(-1, 6), axis=0), np.sort(ends[1].reshape(-1, 6), axis=0))
+    assert part.marked(()) is None and part.marked(("sharp",)) is None
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_a_limit_over_the_atlas_is_certified_as_such(addon):
+    obj = sphere(cells=12)
+    unwrap(stretch_limit=1.01)
+    alone = certificate()
+    unwrap(stretch_limit=1.01, limit_over="ATLAS")
+    together = certificate()
+    assert_good(obj)
+    for lines in (alone, together):
+        assert all(status in {"OK", "INFO"} for status, _ in lines), lines
+    charts = [int(lines[0][1].split(" in ")[1].split()[0]) for lines in (alone, together)]
+    assert charts[1] <= charts[0], charts
+    engine = addon("engine")
+    measured = {"l2_worst_chart": 1.2, "l2_chart_scale": 1.05}
+    assert engine.certify(measured, margin=4, stretch_limit=1.1, limit_over="ATLAS").holds
+    assert not engine.certify(measured, margin=4, stretch_limit=1.1).holds
+    broken = engine.certify(measured, margin=4, stretch_limit=1.01, limit_over="ATLAS").violations
+    assert broken == ["the atlas has stretch 1.050, limit is 1.01"]
+
+
+def test_the_redo_panel_finds_the_analysis_and_gives_the_same(addon):
+    engine = addon("engine")
+    obj = sphere()
+    results, first = [], None
+    for limit in (1.1, 1.02, 1.1):
+        unwrap(stretch_limit=limit)
+        results.append(uvs(obj).copy())
+        kept = engine._Kept.analysis
+        assert kept is not None and (first is None or kept is first)
+        first = kept
+    assert np.array_equal(results[0], results[2]) and not np.array_equal(results[0], results[1])
+    engine.forget()
+    unwrap(stretch_limit=1.02)
+    assert np.array_equal(uvs(obj), results[1]) and engine._Kept.analysis is not first
+    first = engine._Kept.analysis
+    obj.data.vertices[0].co.z += 0.1
+    unwrap(stretch_limit=1.02)
+    assert engine._Kept.analysis is not first, "another mesh"
+    first = engine._Kept.analysis
+    unwrap(stretch_limit=1.02, weld=True)
+    assert engine._Kept.analysis is not first, "another surface"
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert engine._Kept.analysis is None
 
 
 def test_seams_of_the_result_are_marked_on_request():

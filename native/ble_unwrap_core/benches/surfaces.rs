@@ -3,6 +3,98 @@
 use ble_unwrap_core::Progress;
 use ble_unwrap_core::geodesics::{Metric, geodesic_distances};
 use ble_unwrap_core::mesh::TriMesh;
+use ble_unwrap_fixtures::{PolyMesh, torus, voxels};
+use nalgebra::Point2;
+use std::f64::consts::{FRAC_PI_4, TAU};
+
+/// Directions of the horns (and, of negative height, the dents) of [`sculpt`], with width and height of each.
+const HORNS: [([f64; 3], f64, f64); 7] = [
+    ([0.36, 0.48, 0.80], 0.030, 1.3),
+    ([-0.48, 0.36, 0.80], 0.050, 1.0),
+    ([0.80, -0.60, 0.00], 0.040, 0.8),
+    ([-0.60, -0.64, -0.48], 0.060, 0.6),
+    ([0.00, 0.60, -0.80], 0.035, 1.1),
+    ([0.00, -0.80, 0.60], 0.060, -0.35),
+    ([-0.96, 0.28, 0.00], 0.050, -0.30),
+];
+/// Frequencies and height of the ripples on it.
+const RIPPLES: [([f64; 3], f64); 3] = [([3.1, -2.3, 1.7], 0.06), ([-5.3, 4.1, 6.7], 0.03), ([11.3, 9.7, -12.1], 0.012)];
+
+/// A closed body of genus 0 in `6·cells²` quads, with horns, dents and ripples: of the kind a sculptor makes. The same
+/// shape in every resolution.
+pub(crate) fn sculpt(cells: usize) -> PolyMesh {
+    voxels([cells; 3], |_| true).moved(|p| {
+        // Equal angles give even cells.
+        let cube = p.map(|x| (FRAC_PI_4 * (2.0 * x / cells as f64 - 1.0)).tan());
+        let length = dot(cube, cube).sqrt();
+        let d = cube.map(|x| x / length);
+        let horns: f64 = HORNS.iter().map(|&(axis, width, height)| height * ((dot(d, axis) - 1.0) / width).exp()).sum();
+        let ripples: f64 = RIPPLES.iter().map(|&(wave, height)| height * (dot(d, wave) + wave[0]).sin()).sum();
+        let radius = 1.0 + horns + ripples;
+        [radius * d[0], 0.85 * radius * d[1], 1.15 * radius * d[2]]
+    })
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// A mesh of triangles as the stages see it.
+pub(crate) fn tri_mesh(mesh: &PolyMesh) -> TriMesh {
+    let positions: Vec<_> = mesh.positions.iter().map(|&p| p.into()).collect();
+    TriMesh::from_triangles(&positions, &mesh.triangles()).0
+}
+
+/// A torus of `4·across²` triangles: to lay it out, two loops have to be cut.
+pub(crate) fn ring(across: usize) -> TriMesh {
+    tri_mesh(&torus(0.4, 2 * across, across))
+}
+
+/// A copy of a map in the plane with one smooth fold in its middle, as wide as this share of the map: some triangles are
+/// turned over there, as an embedding leaves them that looks at distances alone.
+pub(crate) fn folded(uv: &[Point2<f64>], share: f64) -> Vec<Point2<f64>> {
+    let mean = |k: usize| uv.iter().map(|p| p[k]).sum::<f64>() / uv.len() as f64;
+    let centre = Point2::new(mean(0), mean(1));
+    let extent = uv.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
+    let width = share * extent;
+    uv.iter()
+        .map(|p| {
+            let r = (p - centre) / width;
+            Point2::new(p.x + 1.6 * width * (-r.norm_squared()).exp(), p.y)
+        })
+        .collect()
+}
+
+/// Chart number `k` of many: a wavy star-shaped outline, filled by rings of triangles. Sizes differ as those of real
+/// charts do, a few large ones and many small.
+pub(crate) fn blob(k: usize) -> (Vec<Point2<f64>>, Vec<[u32; 3]>) {
+    const AROUND: usize = 96;
+    const RINGS: usize = 6;
+    let fraction = |step: f64| (k as f64 * step).fract();
+    let (waves, depth, turn) =
+        (2 + k % 5, 0.15 + 0.3 * fraction(0.618_033_988_749_894_9), TAU * fraction(0.754_877_666));
+    let size = 0.2 + fraction(0.569_840_290_998).powi(3);
+    let aspect = 1.0 + 1.5 * fraction(0.324_717_957_244);
+    let mut points = vec![Point2::origin()];
+    for ring in 1..=RINGS {
+        for step in 0..AROUND {
+            let angle = TAU * step as f64 / AROUND as f64;
+            let edge = size * (1.0 + depth * (waves as f64 * angle + turn).sin());
+            let r = edge * ring as f64 / RINGS as f64;
+            points.push(Point2::new(aspect * r * angle.cos(), r * angle.sin()));
+        }
+    }
+    let at = |ring: usize, step: usize| (1 + (ring - 1) * AROUND + step % AROUND) as u32;
+    let mut triangles: Vec<[u32; 3]> = (0..AROUND).map(|step| [0, at(1, step), at(1, step + 1)]).collect();
+    for ring in 1..RINGS {
+        for step in 0..AROUND {
+            let (a, b) = (at(ring, step), at(ring, step + 1));
+            let (c, d) = (at(ring + 1, step + 1), at(ring + 1, step));
+            triangles.extend([[a, d, c], [a, c, b]]);
+        }
+    }
+    (points, triangles)
+}
 
 /// A face-like surface of `side`² vertices: an oval bulge with nose, brows and eye sockets. About the relief of a
 /// scanned face, over one unit of width.

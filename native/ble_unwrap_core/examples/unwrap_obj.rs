@@ -9,6 +9,8 @@ use std::{env, fs};
 
 use ble_unwrap_core::{MeshInput, Progress, Settings, unwrap};
 
+mod obj;
+
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = env::args().skip(1).collect();
     let [input, output, rest @ ..] = arguments.as_slice() else {
@@ -18,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     if let Some(limit) = rest.first() {
         settings.stretch_limit = limit.parse()?;
     }
-    let (positions, faces) = read_obj(&fs::read_to_string(input)?)?;
+    let (positions, faces) = obj::read(&fs::read_to_string(input)?)?;
     let corners: Vec<i32> = faces.iter().flatten().copied().collect();
     let mut offsets = vec![0];
     for face in &faces {
@@ -29,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         corner_vertices: &corners,
         face_offsets: &offsets,
         corner_triangles: None,
-        seams: &[],
+        ..MeshInput::default()
     };
     let atlas = unwrap(&mesh, &settings, &Progress::new())?;
     println!("{:#?}", atlas.report);
@@ -49,29 +51,4 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     fs::write(output, text)?;
     Ok(())
-}
-
-type Polygons = (Vec<[f64; 3]>, Vec<Vec<i32>>);
-
-fn read_obj(text: &str) -> Result<Polygons, Box<dyn Error>> {
-    let (mut positions, mut faces) = (Vec::new(), Vec::new());
-    for line in text.lines() {
-        let mut words = line.split_whitespace();
-        match words.next() {
-            Some("v") => {
-                let xyz = words.take(3).map(str::parse).collect::<Result<Vec<f64>, _>>()?;
-                positions.push(xyz.try_into().map_err(|_| "a vertex needs three coordinates")?);
-            }
-            Some("f") => {
-                let count = i32::try_from(positions.len())?;
-                let vertex = |word: &str| -> Result<i32, Box<dyn Error>> {
-                    let index: i32 = word.split('/').next().unwrap_or(word).parse()?;
-                    Ok(if index < 0 { count + index } else { index - 1 })
-                };
-                faces.push(words.map(vertex).collect::<Result<Vec<i32>, _>>()?);
-            }
-            _ => {}
-        }
-    }
-    Ok((positions, faces))
 }

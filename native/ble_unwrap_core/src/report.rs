@@ -41,7 +41,11 @@ pub struct Report {
     pub seconds: Vec<(&'static str, f64)>,
     /// How many charts were made by each rung of the ladder of fallbacks.
     pub rungs: Vec<(&'static str, usize)>,
-    /// Charts above the stretch limit, with their L2 stretch, ascending.
+    /// The L2 stretch that each chart was held to.
+    pub chart_limit: f64,
+    /// The L2 stretch that the whole layout was held to (`l2`, with charts of uniform scale), if the limit was over that.
+    pub atlas_limit: Option<f64>,
+    /// Charts above `chart_limit`, with their L2 stretch, ascending.
     pub charts_over_limit: Vec<(usize, f64)>,
     /// What the user should know besides, in sentences.
     pub warnings: Vec<String>,
@@ -78,6 +82,7 @@ impl Report {
             seam_length_absolute: measures.seam_length_absolute,
             packing_efficiency: measures.packing_efficiency,
             gap_texels: measures.gap_texels,
+            chart_limit: limit,
             charts_over_limit: over,
             ..Self::default()
         }
@@ -109,10 +114,7 @@ mod tests {
         assert_eq!((r.charts, r.worst_chart, r.charts_over_limit.len()), (3, Some(5), 1));
         // ½(1 + 1/9)·3
         assert!((r.charts_over_limit[0].1 - (5.0f64 / 3.0).sqrt()).abs() < 1e-6);
-        assert_eq!(
-            Report::new(&measures, 1.29),
-            Report { charts_over_limit: r.charts_over_limit.clone(), ..r.clone() }
-        );
+        assert_eq!(Report::new(&measures, 1.29), Report { chart_limit: 1.29, ..r.clone() });
         assert!(Report::new(&measures, 1.3).charts_over_limit.is_empty());
     }
 }

@@ -15,6 +15,9 @@ const PAPER_TOGETHER_MAX: usize = 2_000;
 /// Most vertices of a patch whose distances to each other can be handled: 8 GB and minutes.
 pub(crate) const MOST_TOGETHER: usize = 20_000;
 
+/// The value of [`Settings::least_sewn`] that keeps charts from being sewn.
+pub const NEVER_SEWN: f64 = 1e3;
+
 /// What happens to the holes of a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Holes {
@@ -33,11 +36,26 @@ pub enum ChartScale {
     Stretch,
 }
 
+/// What the stretch limit bounds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LimitOver {
+    /// The L2 stretch of every chart.
+    Chart,
+    /// The L2 stretch of the whole atlas, as UVAtlas has it: the root of the area-weighted mean of the charts' squared L2
+    /// stretch. Single charts may have more, up to [`Settings::chart_limit`].
+    Atlas,
+}
+
+/// A limit over the atlas lets single charts stretch so many times more above 1.
+const SINGLE_CHARTS: f64 = 4.0;
+
 /// All settings of [`unwrap`](crate::unwrap()), grouped by stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Upper bound of the L2 stretch of every chart, above 1.
+    /// Upper bound of the L2 stretch, above 1.
     pub stretch_limit: f64,
+    /// Of what: of every chart, or of all together.
+    pub limit_over: LimitOver,
     /// Whether vertices at exactly the same position count as one. Off by default: an edge between two
     /// vertices of the input is then a seam only if the result says so. Turn it on for data that
     /// repeats vertices along seams of its own, as many file formats do.
@@ -46,6 +64,10 @@ pub struct Settings {
     pub coarse: bool,
     /// Whether neighbouring charts are joined again where their union stays under the limit.
     pub merge: bool,
+    /// Charts whose union would be over the limit are sewn along a part of their border, the rest being left as a dart,
+    /// where that part is at least this share of the square root of the smaller one's area: less for fewer charts and a
+    /// shorter seam, more for compact charts. From [`NEVER_SEWN`] on none are.
+    pub least_sewn: f64,
     /// Holes of charts.
     pub holes: Holes,
     /// Relative scale of charts.
@@ -72,9 +94,11 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             stretch_limit: 1.1,
+            limit_over: LimitOver::Chart,
             weld: false,
             coarse: true,
             merge: true,
+            least_sewn: 0.2,
             holes: Holes::Keep,
             chart_scale: ChartScale::Uniform,
             together_max: 0,
@@ -99,6 +123,8 @@ impl Settings {
         Self {
             holes: Holes::Cut,
             coarse: false,
+            least_sewn: NEVER_SEWN,
+            segmentation: SegmentationSettings::paper(),
             together_max: PAPER_TOGETHER_MAX,
             geodesics: GeodesicSettings::paper(),
             embedding: EmbeddingSettings::paper(),
@@ -118,6 +144,16 @@ impl Settings {
 }
 
 impl Settings {
+    /// The L2 stretch that a single chart may have: the limit, or where that is over the atlas 1 and four times what the
+    /// limit is above 1.
+    #[must_use]
+    pub fn chart_limit(&self) -> f64 {
+        match self.limit_over {
+            LimitOver::Chart => self.stretch_limit,
+            LimitOver::Atlas => 1.0 + SINGLE_CHARTS * (self.stretch_limit - 1.0),
+        }
+    }
+
     /// Checks every range.
     ///
     /// # Errors
@@ -129,7 +165,7 @@ impl Settings {
         let t = &self.stretch;
         let positive = "a positive number";
         let unit = "between 0 and 1";
-        let checks: [(&'static str, f64, bool, &'static str); 15] = [
+        let checks: [(&'static str, f64, bool, &'static str); 17] = [
             (
                 "stretch_limit",
                 self.stretch_limit,
@@ -145,10 +181,17 @@ impl Settings {
             ("landmark_min", g.landmark_min as f64, g.landmark_min >= 3, "at least 3"),
             ("landmark_max", g.landmark_max as f64, g.landmark_max >= g.landmark_min, "at least landmark_min"),
             ("together_max", self.together_max as f64, self.together_max <= MOST_TOGETHER, "at most 20,000"),
+            ("least_sewn", self.least_sewn, (0.0..=NEVER_SEWN).contains(&self.least_sewn), "between 0 and 1000"),
             ("first_parts", s.first_parts as f64, s.first_parts >= 2, "at least 2"),
             ("later_parts", s.later_parts as f64, s.later_parts >= 2, "at least 2"),
             ("band", s.band, (0.0..=1.0).contains(&s.band), unit),
-            ("crease_weight", s.crease_weight, (0.0..=1.0).contains(&s.crease_weight), unit),
+            ("crease_share", s.crease_share, (0.0..=1.0).contains(&s.crease_share), unit),
+            (
+                "crease_weight",
+                s.crease_weight,
+                (0.0..=SegmentationSettings::MOST_CREASE_WEIGHT).contains(&s.crease_weight),
+                "between 0 and 2",
+            ),
             (
                 "kernel_width",
                 e.kernel_width.unwrap_or(1.0),

@@ -16,7 +16,7 @@ fn input<'a>(mesh: &'a PolyMesh, flat: &'a FlatPolygons) -> MeshInput<'a> {
         corner_vertices: &flat.corner_vertices,
         face_offsets: &flat.face_offsets,
         corner_triangles: None,
-        seams: &[],
+        ..MeshInput::default()
     }
 }
 

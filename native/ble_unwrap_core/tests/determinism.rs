@@ -11,7 +11,7 @@ fn unwrapped(mesh: &PolyMesh, settings: &Settings, threads: usize) -> Atlas {
         corner_vertices: &flat.corner_vertices,
         face_offsets: &flat.face_offsets,
         corner_triangles: None,
-        seams: &[],
+        ..MeshInput::default()
     };
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
     pool.install(|| unwrap(&input, settings, &Progress::new())).expect("unwraps")

@@ -1,7 +1,7 @@
 //! Conditioning of the catalogue's meshes and of whatever index arrays can hold.
 
 use ble_unwrap_core::Progress;
-use ble_unwrap_core::mesh::{ConditionOptions, MeshError, MeshInput, Surface, condition, measure};
+use ble_unwrap_core::mesh::{ConditionOptions, FaceId, HalfedgeId, MeshError, MeshInput, Surface, condition, measure};
 use ble_unwrap_fixtures::{
     Case, FlatPolygons, PolyMesh, book, catalogue, grid, keyhole, moebius, sculpt_like, soup, torus,
 };
@@ -63,7 +63,7 @@ fn input<'a>(mesh: &'a PolyMesh, flat: &'a FlatPolygons) -> MeshInput<'a> {
         corner_vertices: &flat.corner_vertices,
         face_offsets: &flat.face_offsets,
         corner_triangles: None,
-        seams: &[],
+        ..MeshInput::default()
     }
 }
 
@@ -191,6 +191,28 @@ fn seams_cut_welded_vertices_too() {
 }
 
 #[test]
+fn guides_mark_both_sides_of_edges_and_nothing_else() {
+    let left = grid(4, 8, |u, v| [u, v, 0.0]);
+    let mesh = left.joined(&grid(4, 8, |u, v| [u + 1.0, v, 0.0]));
+    let flat = mesh.flat();
+    // Along the welded border by vertices of the left strip, a diagonal of a quad and a pair that is no edge.
+    let mut guides: Vec<[i32; 2]> = (0..8).map(|j| [5 * j + 9, 5 * j + 4]).collect();
+    guides.extend([[0, 6], [0, 44]]);
+    for (weld, sides) in [(true, 2), (false, 1)] {
+        let surface = run(&MeshInput { guides: &guides, ..input(&mesh, &flat) }, weld).expect("valid");
+        let m = &surface.mesh;
+        let marked: Vec<HalfedgeId> = m.halfedges().filter(|&h| m.is_guide(h)).collect();
+        assert_eq!(marked.len(), 8 * sides, "welded: {weld}");
+        assert!(marked.iter().all(|&h| m.is_boundary(h) != weld && (weld == m.is_guide(m.twin(h)) || !weld)));
+        let faces: Vec<FaceId> = m.faces().collect();
+        let (part, _) = m.submesh(&faces[8..], |_| false);
+        let kept = faces[8..].iter().flat_map(|f| f.halfedges()).filter(|&h| m.is_guide(h)).count();
+        assert_eq!(part.halfedges().filter(|&h| part.is_guide(h)).count(), kept, "parts keep the marks");
+    }
+    assert!(!run(&input(&mesh, &flat), true).expect("valid").mesh.has_guides());
+}
+
+#[test]
 fn coincident_copies_stay_apart() {
     let sheet = grid(6, 6, |u, v| [u, v, 0.0]);
     for other in [sheet.clone(), sheet.clone().flipped(|_| true)] {
@@ -276,13 +298,13 @@ proptest! {
     ) {
         let input = MeshInput {
             positions: &positions, corner_vertices: &corner_vertices, face_offsets: &face_offsets,
-            corner_triangles: None, seams: &seams,
+            corner_triangles: None, seams: &seams, ..MeshInput::default()
         };
         match run(&input, weld) {
             Ok(surface) => {
                 prop_assert_eq!(check(&input, &surface), Ok(()));
                 let mesh = &surface.mesh;
-                let vertex = |h: ble_unwrap_core::mesh::HalfedgeId| input.corner_vertices[surface.corner[h.index()] as usize];
+                let vertex = |h: HalfedgeId| input.corner_vertices[surface.corner[h.index()] as usize];
                 for h in mesh.halfedges().filter(|&h| !mesh.is_boundary(h) && !surface.is_diagonal(h)) {
                     let ends = [vertex(h), vertex(h.next())];
                     prop_assert!(!seams.iter().any(|s| *s == ends || [s[1], s[0]] == ends), "a seam was glued");
@@ -314,7 +336,7 @@ proptest! {
         }
         let input = MeshInput {
             positions: &positions, corner_vertices: &corner_vertices, face_offsets: &face_offsets,
-            corner_triangles: triangles.as_deref(), seams: &seams,
+            corner_triangles: triangles.as_deref(), seams: &seams, ..MeshInput::default()
         };
         match run(&input, true) {
             Ok(surface) => prop_assert_eq!(check(&input, &surface), Ok(())),

@@ -13,7 +13,7 @@ fn input<'a>(mesh: &'a PolyMesh, flat: &'a FlatPolygons) -> MeshInput<'a> {
         corner_vertices: &flat.corner_vertices,
         face_offsets: &flat.face_offsets,
         corner_triangles: None,
-        seams: &[],
+        ..MeshInput::default()
     }
 }
 
@@ -258,7 +258,7 @@ proptest! {
         }
         let input = MeshInput {
             positions: &positions, corner_vertices: &corner_vertices, face_offsets: &face_offsets,
-            corner_triangles: None, seams: &[],
+            corner_triangles: None, ..MeshInput::default()
         };
         let mut settings = Settings { weld, ..Settings::default() };
         // Small, for speed.

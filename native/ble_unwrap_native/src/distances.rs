@@ -61,7 +61,7 @@ pub(crate) fn geodesic_distances(
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
     let call = settings::from_keywords(settings, Function::GeodesicDistances)?;
-    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, None)?;
+    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, None, None)?;
     let sources = arrays::indices(sources, Argument { name: "sources", shape: "(k,)" })?;
     let shape = [sources.len(), mesh.vertex_count()];
     let job = Job::given_or_new(py, job)?;

@@ -111,6 +111,7 @@ impl Raised for MeshError {
             | Self::TriangleCornerOutOfRange { .. }
             | Self::TriangleAcrossFaces { .. }
             | Self::SeamOutOfRange { .. }
+            | Self::GuideOutOfRange { .. }
             | Self::TooLarge { .. }
             | Self::NoFiniteFace { .. } => Kind::Mesh,
             Self::Cancelled(error) => error.kind(),

@@ -112,7 +112,7 @@ pub(crate) fn flatten(
 ) -> PyResult<Py<PyAny>> {
     let call = settings::from_keywords(settings, Function::Flatten)?;
     let minimise = minimise.map_or(Ok(true), |given| settings::flag("minimise", given))?;
-    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, None)?;
+    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, None, None)?;
     let job = Job::given_or_new(py, job)?;
     job.get().start(
         call.threads,

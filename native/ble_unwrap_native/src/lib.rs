@@ -1,5 +1,6 @@
 //! Python bindings of BLE Unwrap: converts, calls the core, converts back. Registration alone is here.
 
+mod analysis;
 mod arrays;
 mod cloud;
 mod distances;
@@ -23,6 +24,8 @@ mod words;
 mod native {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use crate::analysis::{Analysis, analyse};
     #[pymodule_export]
     use crate::cloud::{PointAtlas, submit_unwrap_points, unwrap_points};
     #[pymodule_export]

@@ -72,7 +72,7 @@ pub(crate) fn measure(
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
     let call = settings::from_keywords(settings, Function::Measure)?;
-    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, None)?;
+    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, None, None)?;
     let uv = arrays::single_rows(uv, Argument { name: "uv", shape: "(c, 2)" })?;
     let chart = chart.map(|given| arrays::indices(given, Argument { name: "chart", shape: "(f,)" })).transpose()?;
     let packing = call.settings.packing;

@@ -26,6 +26,8 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'
         gap_texels,
         seconds,
         rungs,
+        chart_limit,
+        atlas_limit,
         charts_over_limit,
         warnings,
     } = report;
@@ -48,6 +50,8 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'
     dict.set_item("gap_texels", gap_texels)?;
     dict.set_item("seconds", sums(py, seconds)?)?;
     dict.set_item("rungs", sums(py, rungs)?)?;
+    dict.set_item("chart_limit", chart_limit)?;
+    dict.set_item("atlas_limit", atlas_limit)?;
     dict.set_item("charts_over_limit", charts_over_limit)?;
     dict.set_item("warnings", warnings)?;
     Ok(dict)

@@ -1,8 +1,9 @@
 //! Settings by keyword. One table names every setting, its place in the core and its range; parsing,
 //! defaults and error messages all come from it.
 
-use ble_unwrap_core::Settings;
 use ble_unwrap_core::packing::PackSettings;
+use ble_unwrap_core::segmentation::SegmentationSettings;
+use ble_unwrap_core::{NEVER_SEWN, Settings};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyString};
 
@@ -43,6 +44,7 @@ pub(crate) enum Preset {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Function {
     Unwrap,
+    Analyse,
     UnwrapPoints,
     Embed,
     Flatten,
@@ -58,6 +60,7 @@ impl Function {
     fn name(self) -> &'static str {
         match self {
             Self::Unwrap => "unwrap",
+            Self::Analyse => "analyse",
             Self::UnwrapPoints => "unwrap_points",
             Self::Embed => "embed",
             Self::Flatten => "flatten",
@@ -136,6 +139,7 @@ const MOST_TEXELS: u32 = PackSettings::LARGEST_SIZE;
 
 const UNWRAP: &[Function] = &[];
 const CLOUD: &[Function] = &[Function::UnwrapPoints];
+const SURFACE: &[Function] = &[Function::Analyse, Function::Flatten];
 const FLATTEN: &[Function] = &[Function::Flatten];
 const LANDMARKS: &[Function] = &[Function::Flatten, Function::UnwrapPoints];
 const EMBED: &[Function] = &[Function::Embed, Function::Flatten, Function::UnwrapPoints];
@@ -144,6 +148,7 @@ const GEODESICS: &[Function] = &[Function::GeodesicDistances, Function::Flatten]
 const PACK: &[Function] = &[Function::Pack, Function::UnwrapPoints];
 const TEXTURE: &[Function] = &[Function::Measure, Function::Pack, Function::UnwrapPoints];
 const ALL: &[Function] = &[
+    Function::Analyse,
     Function::Embed,
     Function::Transform,
     Function::Place,
@@ -158,11 +163,14 @@ const ALL: &[Function] = &[
 #[rustfmt::skip] // a table: one row a setting
 const TABLE: &[Setting] = &[
     row("stretch_limit", Field::Real(|c| &mut c.settings.stretch_limit, Interval::above(1.0, 1e3)), CLOUD),
-    row("weld", Field::Flag(|c| &mut c.settings.weld), FLATTEN),
+    row("limit_over", Field::Word(|c| &mut c.settings.limit_over), UNWRAP),
+    row("weld", Field::Flag(|c| &mut c.settings.weld), SURFACE),
     row("coarse", Field::Flag(|c| &mut c.settings.coarse), CLOUD),
     row("merge", Field::Flag(|c| &mut c.settings.merge), UNWRAP),
+    row("least_sewn", Field::Real(|c| &mut c.settings.least_sewn, Interval::closed(0.0, NEVER_SEWN)), UNWRAP),
     row("holes", Field::Word(|c| &mut c.settings.holes), UNWRAP),
     row("chart_scale", Field::Word(|c| &mut c.settings.chart_scale), UNWRAP),
+    row("crease_weight", Field::Real(|c| &mut c.settings.segmentation.crease_weight, Interval::closed(0.0, SegmentationSettings::MOST_CREASE_WEIGHT)), UNWRAP),
     row("seed", Field::Seed(|c| &mut c.settings.seed), EMBED),
     row("geodesics", Field::Word(|c| &mut c.settings.geodesics.metric), GEODESICS),
     row("landmark_fraction", Field::Real(|c| &mut c.settings.geodesics.landmark_fraction, Interval::above(0.0, 1.0)), LANDMARKS),

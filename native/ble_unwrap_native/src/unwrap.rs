@@ -44,6 +44,7 @@ pub(crate) struct MeshArrays {
     face_offsets: Vec<i32>,
     corner_triangles: Option<Vec<[i32; 3]>>,
     seams: Vec<[i32; 2]>,
+    guides: Vec<[i32; 2]>,
 }
 
 impl MeshArrays {
@@ -54,15 +55,19 @@ impl MeshArrays {
         face_offsets: &Bound<'_, PyAny>,
         corner_triangles: Option<&Bound<'_, PyAny>>,
         seams: Option<&Bound<'_, PyAny>>,
+        guides: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let triangles = Argument { name: "corner_triangles", shape: "(t, 3)" };
-        let cuts = Argument { name: "seams", shape: "(s, 2)" };
+        let pairs = |given: Option<&Bound<'_, PyAny>>, argument| {
+            given.map(|given| arrays::index_rows(given, argument)).transpose().map(Option::unwrap_or_default)
+        };
         Ok(Self {
             positions: arrays::real_rows(positions, Argument { name: "positions", shape: "(n, 3)" })?,
             corner_vertices: arrays::indices(corner_vertices, Argument { name: "corner_vertices", shape: "(c,)" })?,
             face_offsets: arrays::indices(face_offsets, Argument { name: "face_offsets", shape: "(f + 1,)" })?,
             corner_triangles: corner_triangles.map(|given| arrays::index_rows(given, triangles)).transpose()?,
-            seams: seams.map(|given| arrays::index_rows(given, cuts)).transpose()?.unwrap_or_default(),
+            seams: pairs(seams, Argument { name: "seams", shape: "(s, 2)" })?,
+            guides: pairs(guides, Argument { name: "guides", shape: "(g, 2)" })?,
         })
     }
 
@@ -74,6 +79,7 @@ impl MeshArrays {
             face_offsets: &self.face_offsets,
             corner_triangles: self.corner_triangles.as_deref(),
             seams: &self.seams,
+            guides: &self.guides,
         }
     }
 
@@ -87,13 +93,16 @@ fn start(job: &Job, mesh: MeshArrays, call: Call) -> PyResult<()> {
     job.start(
         call.threads,
         move |progress| ble_unwrap_core::unwrap(&mesh.input(), &call.settings, progress).map_err(Failure::from),
-        |py, atlas| {
-            let uv = Py::new(py, Array::from_f32_rows(atlas.uv))?;
-            let chart = Py::new(py, Array::from_i32(atlas.chart))?;
-            let report = report::to_dict(py, &atlas.report)?.unbind();
-            Ok(Py::new(py, Atlas { uv, chart, report })?.into_any())
-        },
+        to_python,
     )
+}
+
+/// An atlas of the core as one of Python.
+pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResult<Py<PyAny>> {
+    let uv = Py::new(py, Array::from_f32_rows(atlas.uv))?;
+    let chart = Py::new(py, Array::from_i32(atlas.chart))?;
+    let report = report::to_dict(py, &atlas.report)?.unbind();
+    Ok(Py::new(py, Atlas { uv, chart, report })?.into_any())
 }
 
 /// Cut a surface into charts, flatten them under a stretch limit and pack them into one atlas.
@@ -113,23 +122,33 @@ fn start(job: &Job, mesh: MeshArrays, call: Call) -> PyResult<()> {
 ///     Triangles by corner, which together triangulate the faces. Made if absent or if they do not cover a face.
 /// seams : (s, 2) int32 or int64, optional
 ///     Edges to be cut, by their two vertices. Pairs that are no edge do nothing.
+/// guides : (g, 2) int32 or int64, optional
+///     Edges that borders of charts follow where a border is needed, such as sharp edges and borders of materials.
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
 /// preset : {"default", "paper", "iso_charts"}
 ///     Where settings that are not given come from. ``"paper"``: the published method as printed; ``"iso_charts"``: the same
 ///     with Isomap, which the paper compares itself with.
 /// stretch_limit : float, above 1
-///     Upper bound of the L2 stretch of every chart. 1 is isometric; the default is 1.1.
+///     Upper bound of the L2 stretch. 1 is isometric; the default is 1.1.
+/// limit_over : {"chart", "atlas"}
+///     What the limit bounds: the stretch of every chart, or as in UVAtlas the root of the area-weighted mean of the
+///     charts' squared stretch. Single charts may then have up to four times as much above 1.
 /// weld : bool
 ///     Whether vertices at the same position count as one.
 /// coarse : bool
 ///     Whether large pieces of surface are cut into charts on a coarse mesh first, which is many times faster.
 /// merge : bool
 ///     Whether charts are joined again where their union stays under the limit.
+/// least_sewn : float, 0 to 1000
+///     Charts are sewn along a part of their border, the rest left as a dart, where that is at least this share of the
+///     square root of the smaller one's area. Less for fewer charts, more for compact ones, 1000 for no darts.
 /// holes : {"keep", "cut"}
 ///     Whether charts may have holes or are cut to disks.
 /// chart_scale : {"uniform", "stretch"}
 ///     The same texel density for all charts, or more for stretched ones.
+/// crease_weight : float, 0 to 2
+///     How strongly borders are drawn to creases: 0 not at all, 1 by default.
 /// seed : int
 ///     Seed of every random choice.
 /// geodesics : {"fast_marching", "dijkstra"}
@@ -171,7 +190,7 @@ fn start(job: &Job, mesh: MeshArrays, call: Call) -> PyResult<()> {
 ///     ``uv`` (c, 2) float32, ``chart`` (f,) int32 and ``report``, a dict with ``charts``, ``faces``,
 ///     ``unmapped_faces``, ``l2``, ``l2_chart_scale``, ``l2_worst_chart``, ``l_infinity``, ``angle_distortion``,
 ///     ``area_distortion``, ``flips``, ``overlaps``, ``seam_length``, ``packing_efficiency``, ``gap_texels``,
-///     ``charts_over_limit``, ``rungs``, ``seconds``, ``warnings`` and more.
+///     ``chart_limit``, ``atlas_limit``, ``charts_over_limit``, ``rungs``, ``seconds``, ``warnings`` and more.
 ///
 /// Raises
 /// ------
@@ -188,8 +207,8 @@ fn start(job: &Job, mesh: MeshArrays, call: Call) -> PyResult<()> {
 /// Notes
 /// -----
 /// Guaranteed, and checked on the float32 values returned: no triangle is flipped, no chart overlaps itself or another,
-/// charts keep the margin, each chart is under the limit or counted in ``charts_over_limit`` (a single face may not
-/// flatten under it). The result is the same, bit for bit, for any number of threads. Not guaranteed: the fewest charts
+/// charts keep the margin, each chart is under ``chart_limit`` or counted in ``charts_over_limit`` (a single face may not
+/// flatten under it); ``l2`` is under ``atlas_limit`` or a warning says so. The result is the same, bit for bit, for any number of threads. Not guaranteed: the fewest charts
 /// or the shortest seams.
 ///
 /// The arrays are copied before work begins; other Python threads run meanwhile. Ctrl-C raises ``KeyboardInterrupt``.
@@ -198,7 +217,7 @@ fn start(job: &Job, mesh: MeshArrays, call: Call) -> PyResult<()> {
 /// Source: Bernoulli Embedding Model and Its Application in Texture Mapping, 2006, with the extensions that
 /// native/ARCHITECTURE.md describes.
 #[pyfunction]
-#[pyo3(signature = (positions, corner_vertices, face_offsets, *, corner_triangles=None, seams=None, job=None, **settings))]
+#[pyo3(signature = (positions, corner_vertices, face_offsets, *, corner_triangles=None, seams=None, guides=None, job=None, **settings))]
 pub(crate) fn unwrap(
     py: Python<'_>,
     positions: &Bound<'_, PyAny>,
@@ -206,11 +225,12 @@ pub(crate) fn unwrap(
     face_offsets: &Bound<'_, PyAny>,
     corner_triangles: Option<&Bound<'_, PyAny>>,
     seams: Option<&Bound<'_, PyAny>>,
+    guides: Option<&Bound<'_, PyAny>>,
     job: Option<Bound<'_, Job>>,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
     let call = settings::from_keywords(settings, Function::Unwrap)?;
-    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, seams)?;
+    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, seams, guides)?;
     let job = Job::given_or_new(py, job)?;
     start(job.get(), mesh, call)?;
     job.get().finish(py)
@@ -232,7 +252,7 @@ pub(crate) fn unwrap(
 ///     If an array has the wrong type or shape, or a setting is unknown or out of range. All other errors, including
 ///     ``InvalidMeshError``, are raised by ``Job.result``.
 #[pyfunction]
-#[pyo3(signature = (positions, corner_vertices, face_offsets, *, corner_triangles=None, seams=None, job=None, **settings))]
+#[pyo3(signature = (positions, corner_vertices, face_offsets, *, corner_triangles=None, seams=None, guides=None, job=None, **settings))]
 pub(crate) fn submit_unwrap<'py>(
     py: Python<'py>,
     positions: &Bound<'py, PyAny>,
@@ -240,11 +260,12 @@ pub(crate) fn submit_unwrap<'py>(
     face_offsets: &Bound<'py, PyAny>,
     corner_triangles: Option<&Bound<'py, PyAny>>,
     seams: Option<&Bound<'py, PyAny>>,
+    guides: Option<&Bound<'py, PyAny>>,
     job: Option<Bound<'py, Job>>,
     settings: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, Job>> {
     let call = settings::from_keywords(settings, Function::Unwrap)?;
-    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, seams)?;
+    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, seams, guides)?;
     let job = Job::given_or_new(py, job)?;
     start(job.get(), mesh, call)?;
     Ok(job)

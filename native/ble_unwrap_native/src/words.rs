@@ -5,7 +5,7 @@ use ble_unwrap_core::geodesics::Metric;
 use ble_unwrap_core::packing::Rotation;
 use ble_unwrap_core::standalone::Connect;
 use ble_unwrap_core::stretch::Solver;
-use ble_unwrap_core::{ChartScale, Holes};
+use ble_unwrap_core::{ChartScale, Holes, LimitOver};
 
 use crate::embed::{DataKind, PointDistance};
 use crate::settings::Preset;
@@ -50,6 +50,7 @@ words!(PointDistance { "euclidean" => Euclidean, "geodesic" => Geodesic });
 words!(Preset { "default" => Default, "paper" => Paper, "iso_charts" => IsoCharts });
 words!(Holes { "keep" => Keep, "cut" => Cut });
 words!(ChartScale { "uniform" => Uniform, "stretch" => Stretch });
+words!(LimitOver { "chart" => Chart, "atlas" => Atlas });
 words!(Connect { "error" => Error, "bridge" => Bridge, "separate" => Separate });
 words!(Metric { "fast_marching" => FastMarching, "dijkstra" => Dijkstra });
 words!(Model { "default" => Default, "paper" => Paper, "isomap" => Isomap });

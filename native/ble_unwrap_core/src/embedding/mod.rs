@@ -50,7 +50,7 @@ pub use input::{EmbedInput, PointMetric};
 pub use landmark_regression::{Evidence, LandmarkModel};
 pub use placement::{FittedLandmarks, place};
 pub use settings::{EmbeddingSettings, Initial, Model};
-pub use unfold::{plane, unfold};
+pub use unfold::{plane, project, unfold};
 
 #[cfg(test)]
 mod embed_tests;

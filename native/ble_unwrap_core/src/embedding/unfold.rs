@@ -37,10 +37,27 @@ pub fn plane(mesh: &TriMesh) -> Option<Vec<Point2<f64>>> {
             return None;
         }
     }
+    onto_plane(mesh, &mean)
+}
+
+/// The orthogonal projection of a mesh along its mean normal, one position a vertex; `None` if a face leans by more than
+/// so many degrees from it. Not guaranteed: freedom from overlap. O(n).
+#[must_use]
+pub fn project(mesh: &TriMesh, most_degrees: f64) -> Option<Vec<Point2<f64>>> {
+    let normals = || mesh.faces().map(|f| area_vector(mesh.triangle_positions(f)));
+    let mean = normals().sum::<Vector3<f64>>().try_normalize(0.0)?;
+    let least = most_degrees.to_radians().cos();
+    // Also refused: what is no number.
+    let upright = normals().all(|n| n.dot(&mean) >= least * n.norm());
+    if upright { onto_plane(mesh, &mean) } else { None }
+}
+
+/// Positions in the plane that `normal` is perpendicular to; `None` if one is not finite.
+fn onto_plane(mesh: &TriMesh, normal: &Vector3<f64>) -> Option<Vec<Point2<f64>>> {
     // Any two axes that make a right-handed frame with the normal; the one least along it first.
-    let smallest = mean.iamin();
-    let u = mean.cross(&Vector3::ith(smallest, 1.0)).try_normalize(0.0)?;
-    let v = mean.cross(&u);
+    let smallest = normal.iamin();
+    let u = normal.cross(&Vector3::ith(smallest, 1.0)).try_normalize(0.0)?;
+    let v = normal.cross(&u);
     let n = mesh.vertex_count() as f64;
     let centre = mesh.positions().iter().map(|p| p.coords).sum::<Vector3<f64>>() / n;
     let projected: Vec<Point2<f64>> =

@@ -54,6 +54,20 @@ impl LandmarkDistances {
         &self.rows[l * self.vertex_count..(l + 1) * self.vertex_count]
     }
 
+    /// The distances of a part, whose vertex `i` is this mesh's `vertices[i]`, from the landmarks that lie in it. Not
+    /// guaranteed: that the shortest paths stay in the part; so they are at most what the part alone would have. O(kn).
+    #[must_use]
+    pub fn restricted(&self, vertices: &[VertexId]) -> Self {
+        let mut place = vec![VertexId::NONE; self.vertex_count];
+        for (i, v) in vertices.iter().enumerate().rev() {
+            place[v.index()] = VertexId::new(i);
+        }
+        let kept: Vec<usize> = (0..self.len()).filter(|&l| !place[self.landmarks[l].index()].is_none()).collect();
+        let rows = kept.iter().flat_map(|&l| vertices.iter().map(move |v| self.row(l)[v.index()])).collect();
+        let landmarks = kept.iter().map(|&l| place[self.landmarks[l].index()]).collect();
+        Self::new(landmarks, vertices.len(), rows)
+    }
+
     /// All distances, row after row.
     #[must_use]
     pub fn into_rows(self) -> Vec<f32> {

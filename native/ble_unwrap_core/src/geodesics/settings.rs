@@ -25,7 +25,7 @@ pub struct GeodesicSettings {
 
 impl Default for GeodesicSettings {
     /// The paper's fraction, kept between 48 (fewer lose accuracy on small charts) and 64 (more
-    /// gain nothing once stretch is minimised, and geodesics are a quarter of the time).
+    /// gain nothing once stretch is minimised).
     fn default() -> Self {
         Self { metric: Metric::FastMarching, landmark_fraction: 0.01, landmark_min: 48, landmark_max: 64 }
     }

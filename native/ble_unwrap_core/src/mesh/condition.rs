@@ -147,9 +147,11 @@ pub fn condition(input: &MeshInput<'_>, options: &ConditionOptions, progress: &P
     // The second pass of scaling: from unit extent to unit area.
     let unit = if total_area > LEAST_AREA { total_area.sqrt() } else { 1.0 };
     let assembled = assemble(&triangulation, inner, &orientation);
+    let guides = guide_marks(input.guides, &polygons, &representative, &assembled);
     let (mesh, source) = TriMesh::from_glued(&assembled.corner, assembled.twin, |corner| {
         points[polygons.vertex(corner as usize)] / unit
     });
+    let mesh = mesh.with_guides(guides);
     let vertex: Vec<u32> = source.iter().map(|&c| polygons.vertex(c as usize) as u32).collect();
     progress.check()?;
 
@@ -314,6 +316,32 @@ fn assemble(triangulation: &Triangulation, inner: InnerEdges, orientation: &Orie
         }
     }
     Assembled { corner, twin, diagonal, reversed }
+}
+
+/// For each half-edge whether its ends are those of a guide; nothing where there are no guides. Vertices that are welded
+/// count as one. O(n log g).
+fn guide_marks(
+    guides: &[[i32; 2]],
+    polygons: &Polygons<'_>,
+    representative: &[u32],
+    assembled: &Assembled,
+) -> Vec<bool> {
+    if guides.is_empty() {
+        return Vec::new();
+    }
+    let key = |[a, b]: [usize; 2]| {
+        let (a, b) = (representative[a], representative[b]);
+        (a.min(b), a.max(b))
+    };
+    let mut keys: Vec<(u32, u32)> = guides.iter().map(|pair| key(pair.map(|v| v as usize))).collect();
+    keys.sort_unstable();
+    keys.dedup();
+    let is_guide = |h: usize| {
+        let ends = [HalfedgeId::new(h), HalfedgeId::new(h).next()];
+        !assembled.diagonal[h]
+            && keys.binary_search(&key(ends.map(|c| polygons.vertex(assembled.corner[c.index()] as usize)))).is_ok()
+    };
+    (0..assembled.corner.len()).map(is_guide).collect()
 }
 
 /// Area of each polygon and of all, in the frame's unit. Counts the triangles that have none.

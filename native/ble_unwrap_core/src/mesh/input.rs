@@ -22,6 +22,8 @@ pub struct MeshInput<'a> {
     pub corner_triangles: Option<&'a [[i32; 3]]>,
     /// Pairs of vertices whose edge is to be cut.
     pub seams: &'a [[i32; 2]],
+    /// Pairs of vertices whose edge is a good place for the border of a chart, where one is needed.
+    pub guides: &'a [[i32; 2]],
 }
 
 /// Why a mesh cannot be unwrapped at all. Numbers count from 0, as the arrays do.
@@ -117,6 +119,18 @@ pub enum MeshError {
         /// Number of vertices.
         vertex_count: usize,
     },
+    /// A guide names a vertex that is not there.
+    #[error(
+        "guide {guide} names vertex {vertex}, but the vertices are numbered 0 to {vertex_count} (exclusive); correct or remove the guide"
+    )]
+    GuideOutOfRange {
+        /// The guide.
+        guide: usize,
+        /// The vertex it names.
+        vertex: i32,
+        /// Number of vertices.
+        vertex_count: usize,
+    },
     /// More elements than 31-bit indices can name.
     #[error("the mesh has {count} {element}, more than the {limit} that can be numbered; split it into several meshes")]
     TooLarge {
@@ -157,7 +171,7 @@ pub(super) struct Polygons<'a> {
 }
 
 impl<'a> Polygons<'a> {
-    /// Checks sizes, offsets, vertex indices and seams; O(n). Triangles are checked where they are
+    /// Checks sizes, offsets, vertex indices, seams and guides; O(n). Triangles are checked where they are
     /// sorted to their faces.
     pub(super) fn new(input: &MeshInput<'a>) -> Result<Self, MeshError> {
         let vertex_count = input.positions.len();
@@ -201,10 +215,15 @@ impl<'a> Polygons<'a> {
             let (face, vertex) = (polygon_of_corner[corner] as usize, input.corner_vertices[corner]);
             return Err(MeshError::VertexOutOfRange { face, corner, vertex, vertex_count });
         }
-        for (seam, pair) in input.seams.iter().enumerate() {
-            if let Some(&vertex) = pair.iter().find(|&&v| !in_range(v)) {
-                return Err(MeshError::SeamOutOfRange { seam, vertex, vertex_count });
-            }
+        let outside = |pairs: &[[i32; 2]]| {
+            let wrong = |(i, pair): (usize, &[i32; 2])| Some((i, *pair.iter().find(|&&v| !in_range(v))?));
+            pairs.iter().enumerate().find_map(wrong)
+        };
+        if let Some((seam, vertex)) = outside(input.seams) {
+            return Err(MeshError::SeamOutOfRange { seam, vertex, vertex_count });
+        }
+        if let Some((guide, vertex)) = outside(input.guides) {
+            return Err(MeshError::GuideOutOfRange { guide, vertex, vertex_count });
         }
         Ok(Self { corner_vertices: input.corner_vertices, face_offsets: input.face_offsets, polygon_of_corner })
     }
@@ -295,5 +314,8 @@ mod tests {
         let error = Polygons::new(&input).expect_err("vertex 7 is not there");
         assert_eq!(error, MeshError::SeamOutOfRange { seam: 1, vertex: 7, vertex_count: 4 });
         assert!(error.to_string().contains("seam 1 names vertex 7"), "{error}");
+        let error = Polygons::new(&MeshInput { seams: &[], guides: &seams, ..input }).expect_err("nor for a guide");
+        assert_eq!(error, MeshError::GuideOutOfRange { guide: 1, vertex: 7, vertex_count: 4 });
+        assert!(error.to_string().contains("guide 1 names vertex 7"), "{error}");
     }
 }

@@ -14,6 +14,8 @@ use super::index::{FaceId, HalfedgeId, VertexId};
 /// vertex form one fan, so there is no bow-tie; every vertex is used by a face.
 ///
 /// Not guaranteed: being connected, having a boundary, positive areas, distinct positions.
+///
+/// Edges may be marked as guides, which the borders of charts should follow; parts keep the marks.
 #[derive(Clone, Debug, Default)]
 pub struct TriMesh {
     positions: Vec<Point3<f64>>,
@@ -21,7 +23,13 @@ pub struct TriMesh {
     twin: Vec<HalfedgeId>,
     /// An outgoing half-edge of each vertex; on the boundary the one without a twin.
     outgoing: Vec<HalfedgeId>,
+    /// Whether a half-edge lies on a guide; empty where none does.
+    guide: Vec<bool>,
 }
+
+/// What a border along a guide counts for its length: a little less than along the edge of a box. It may take a way so
+/// much longer to follow the guide.
+const GUIDE_COST: f64 = 0.1;
 
 /// Counts of the cells of a mesh, and what follows from them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,7 +127,7 @@ impl TriMesh {
         }
         let positions = source.iter().map(|&s| position(s)).collect();
         let triangles = corner_vertex.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
-        (Self { positions, triangles, twin, outgoing }, source)
+        (Self { positions, triangles, twin, outgoing, guide: Vec::new() }, source)
     }
 
     /// Builds a mesh from vertex indices, gluing every pair of opposed half-edges.
@@ -196,8 +204,12 @@ impl TriMesh {
     ) -> (Self, Vec<VertexId>) {
         let mut corner_source = Vec::with_capacity(3 * faces.len());
         let mut twin = Vec::with_capacity(3 * faces.len());
+        let mut guide = Vec::with_capacity(if self.guide.is_empty() { 0 } else { 3 * faces.len() });
         for &f in faces {
             for h in f.halfedges() {
+                if !self.guide.is_empty() {
+                    guide.push(self.is_guide(h));
+                }
                 corner_source.push(self.from(h).index() as u32);
                 let t = self.twin(h);
                 let local = if t.is_none() { None } else { across(h, t) };
@@ -205,7 +217,7 @@ impl TriMesh {
             }
         }
         let (mesh, source) = Self::from_glued(&corner_source, twin, |s| self.positions[s as usize]);
-        (mesh, source.into_iter().map(|s| VertexId::new(s as usize)).collect())
+        (mesh.with_guides(guide), source.into_iter().map(|s| VertexId::new(s as usize)).collect())
     }
 
     /// Number of vertices.
@@ -324,6 +336,37 @@ impl TriMesh {
     #[must_use]
     pub fn edge_length(&self, h: HalfedgeId) -> f64 {
         (self.position(self.to(h)) - self.position(self.from(h))).norm()
+    }
+
+    /// The same mesh with other guides: for each half-edge whether it lies on one, the same for both sides of an edge.
+    ///
+    /// # Panics
+    /// If there is neither a mark for each half-edge nor none at all.
+    #[must_use]
+    pub fn with_guides(self, guide: Vec<bool>) -> Self {
+        assert!(guide.is_empty() || guide.len() == self.twin.len(), "one mark a half-edge");
+        Self { guide: if guide.contains(&true) { guide } else { Vec::new() }, ..self }
+    }
+
+    /// Whether any edge is a guide.
+    #[inline]
+    #[must_use]
+    pub fn has_guides(&self) -> bool {
+        !self.guide.is_empty()
+    }
+
+    /// Whether the borders of charts should follow an edge.
+    #[inline]
+    #[must_use]
+    pub fn is_guide(&self, h: HalfedgeId) -> bool {
+        self.guide.get(h.index()).is_some_and(|guide| *guide)
+    }
+
+    /// What a border along an edge costs beside the same border where there is no guide: 1, or less on a guide.
+    #[inline]
+    #[must_use]
+    pub fn border_cost(&self, h: HalfedgeId) -> f64 {
+        if self.is_guide(h) { GUIDE_COST } else { 1.0 }
     }
 
     /// The half-edges that leave `v`, counter-clockwise; on a boundary from the half-edge without a

@@ -1,111 +1,91 @@
-//! The greatest density at which all charts fit: a first guess, a bracket, then a search over orders.
-//!
-//! Attempts fill the grid upwards and may overshoot its top, so that each tells *how much* too dense
-//! or too loose it was: area goes with the square of the density, so the next guess is the density
-//! divided by the root of the height used. Near the optimum the height is a noisy function of the
-//! order of placement, and the search climbs on that: variations of the best order so far, at a
-//! density slightly above the best that fitted.
+//! The whole of packing: a first guess, sketches on a coarse grid, the best of them on the fine one.
 
 use rayon::prelude::*;
 
+use super::alone::alone;
 use super::grid::Grid;
 use super::mask::Reach;
-use super::order::Strategy;
 use super::outline::Outline;
-use super::place::{Layout, place};
-use super::pose::{base_turns, turn_alone};
-use super::shape::{SAFETY_TEXELS, Shape};
-use super::{PackError, PackSettings, Quality, Rotation};
-use crate::{Progress, Stage};
+use super::pose::base_turns;
+use super::refine::Refinement;
+use super::search::{Best, Search};
+use super::shape::SAFETY_TEXELS;
+use super::sketch::{growth, most_promising};
+use super::{PackError, PackSettings, Pose, Quality, Rotation};
+use crate::Progress;
 
-/// So many of the largest charts are tried in more angles.
+/// So many of the largest charts are tried in more angles than one: about so many in all, at least and at
+/// most so many a chart. Quarter turns of each come for free.
 const LARGE: usize = 24;
-/// Attempts in a round while the density is bracketed, when strategies are compared, and in each round
-/// of variations. They run in parallel; fixed, so that results do not depend on the number of threads.
-const BRACKETING: usize = 2;
-const COMPARED: usize = 8;
-const VARIED: usize = 4;
-/// From so many charts on, search rows are shared by similar footprints.
-const MANY: usize = 600;
-/// Attempts made to find a first fit; from the ninth on each is at least a tenth less dense.
-const SHRINKS: u32 = 80;
+const ANGLES: usize = 24;
+const LEAST_ANGLES: usize = 3;
+const MOST_ANGLES: usize = 8;
 /// Share of the texture charts cover in the first guess, with half a margin around each.
 const FIRST_FILL: f64 = 0.8;
-/// Greatest and least step of density above the best fit.
-const STEP: f64 = 0.003;
-const LEAST_STEP: f64 = 0.0004;
-/// An attempt that uses the height to this share is a start for variations.
-const NEAR: f64 = 0.015;
-/// Rounds without a better fit before the step is halved.
-const PATIENCE: usize = 3;
+/// Vertices of outlines are moved together on a lattice of so many cells of the coarse grid.
+const COARSENED: f64 = 0.3;
+/// Attempts of the search on the fine grid, where no sketch could be refined.
+const LAST_RESORT: usize = 10;
 
-/// The best placement found.
-pub(super) struct Best {
-    pub(super) shapes: Vec<Shape>,
-    pub(super) layout: Layout,
+/// Where a chart went.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// Chart plane to texels.
+    pub(super) pose: Pose,
+    /// Area of the cells it touches, in texels.
+    pub(super) touched: f64,
+    /// Whether it was scaled up to a texel.
+    pub(super) is_speck: bool,
+}
+
+/// A placement of all charts.
+#[derive(Clone, Debug)]
+pub(super) struct Dense {
+    /// By chart; `None` for charts without triangles.
+    pub(super) places: Vec<Option<Place>>,
     /// Texels to a unit of the chart plane.
     pub(super) density: f64,
 }
 
-/// What a search needs to know, fixed throughout.
-struct Search<'a> {
-    outlines: &'a [Outline],
-    turns: Vec<Vec<[f64; 2]>>,
-    quarters: bool,
-    grid: Grid,
-    reach: Reach,
-    progress: &'a Progress,
+/// One search on a coarse grid, and what is made of it.
+#[derive(Clone, Copy, Debug)]
+struct Effort {
+    /// Cells of the coarse grid across the square each chart would have if all were equal, and
+    /// least and most across the texture.
+    across: f64,
+    least: f64,
+    most: f64,
+    /// Attempts on the coarse grid.
+    attempts: usize,
+    /// Sketches refined.
+    sketches: usize,
 }
 
-/// One attempt's outcome: height used over height there is, and the layout.
-struct Attempt {
-    used: f64,
-    layout: Layout,
-    strategy: Strategy,
-}
-
-impl Search<'_> {
-    fn shapes(&self, density: f64) -> Vec<Shape> {
-        let shape = |i: usize| Shape::new(&self.outlines[i], &self.turns[i], self.quarters, density, self.grid.cell);
-        (0..self.outlines.len()).into_par_iter().map(shape).collect()
-    }
-
-    /// Tries all strategies; the one that uses least height, ties by index.
-    fn best_of(&self, shapes: &[Shape], strategies: Vec<Strategy>) -> Result<Option<Attempt>, PackError> {
-        let Grid { columns, rows, .. } = self.grid;
-        let cap = rows + rows / 2;
-        let cells: usize = shapes.iter().map(|s| s.cells).sum();
-        let alike = shapes.len() >= MANY;
-        let attempt = |strategy: Strategy| {
-            let order = strategy.order();
-            let layout = place(shapes, &order, [columns, cap], &self.reach, strategy.goal, alike, self.progress)?;
-            let used = if layout.missing == 0 {
-                layout.rows as f64 / rows as f64
-            } else {
-                1.5 * cells as f64 / (cells - layout.missing).max(cells / 100 + 1) as f64
-            };
-            Ok(Attempt { used, layout, strategy })
-        };
-        let all: Vec<Attempt> = strategies.into_par_iter().map(attempt).collect::<Result<_, PackError>>()?;
-        Ok(all.into_iter().reduce(|a, b| if b.used < a.used { b } else { a }))
-    }
-
-    /// One attempt at a density where every chart is a speck or a point: whether they fit at all.
-    fn all_specks(&self, density: f64, settings: &PackSettings) -> Result<(Best, Grid), PackError> {
-        let shapes = self.shapes(density);
-        match self.best_of(&shapes, Strategy::portfolio(&shapes, 1))? {
-            Some(Attempt { used, layout, .. }) if used <= 1.0 => Ok((Best { shapes, layout, density }, self.grid)),
-            _ => Err(PackError::TooManyCharts {
-                charts: shapes.len(),
-                margin: settings.margin_texels,
-                width: settings.width,
-                height: settings.height,
-            }),
+impl Effort {
+    /// The searches for so many charts, one after the other.
+    fn new(charts: usize, quality: Quality) -> Vec<Self> {
+        let grid = Self { across: 28.0, least: 128.0, most: 384.0, attempts: 0, sketches: 0 };
+        // A few charts have few orders and many poses, and an attempt costs next to nothing.
+        let attempts = |all: usize, least, most| (all / charts.max(1)).clamp(least, most);
+        match quality {
+            Quality::Fast => vec![Self { attempts: attempts(600, 30, 60), sketches: 6, ..grid }],
+            Quality::High => {
+                let (attempts, sketches) = (attempts(20_000, 80, 400), 16);
+                let finer = Self { across: 50.0, least: 384.0, most: 2048.0, attempts, sketches };
+                vec![Self { attempts, sketches, ..grid }, finer]
+            }
         }
     }
 }
 
-/// Places outlines at the greatest density found.
+/// What it took: attempts on the coarse grid and placements on the fine one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Trials {
+    pub(super) attempts: usize,
+    pub(super) placements: u32,
+}
+
+/// Places outlines at the greatest density found, and tells how many trials that took.
 ///
 /// # Errors
 /// [`PackError::MarginTooLarge`], [`PackError::TooManyCharts`], [`PackError::Cancelled`].
@@ -113,120 +93,101 @@ pub(super) fn densest(
     outlines: &[Outline],
     settings: &PackSettings,
     progress: &Progress,
-) -> Result<(Best, Grid), PackError> {
+) -> Result<(Dense, Trials), PackError> {
     let n = outlines.len();
     let grid = Grid::new(settings, n)?;
+    let mut solid = (0..n).filter(|&i| !outlines[i].edges.is_empty());
+    if let (Some(which), None) = (solid.next(), solid.next())
+        && outlines[which].extent > 0.0
+    {
+        return Ok((alone(outlines, which, grid, settings), Trials::default()));
+    }
     let largest = outlines.iter().map(|o| o.extent).fold(0.0, f64::max);
     let area = |i: usize| outlines[i].area * (outlines[i].extent / largest).powi(2);
-    let mut by_area: Vec<usize> = (0..n).collect();
-    by_area.sort_by(|&a, &b| area(b).total_cmp(&area(a)).then(a.cmp(&b)));
-    let mut large = vec![false; n];
-    by_area.iter().take(LARGE).for_each(|&i| large[i] = true);
-    let turns = |i: usize| match settings.rotation {
-        Rotation::Any if n == 1 => vec![turn_alone(&outlines[i], [grid.columns as f64, grid.rows as f64])],
-        // The given pose, in the frame of the grid.
-        Rotation::None if grid.sideways => vec![[0.0, 1.0]],
-        rotation => base_turns(&outlines[i], rotation, large[i]),
-    };
-    let search = Search {
+    let turns = turns(outlines, &(0..n).map(area).collect::<Vec<_>>(), grid, settings);
+    let fine = Search {
         outlines,
-        turns: (0..n).into_par_iter().map(turns).collect(),
+        turns: &turns,
         quarters: settings.rotation != Rotation::None,
         grid,
+        growth: SAFETY_TEXELS / grid.cell,
         reach: Reach::new(settings.margin_texels / grid.cell),
+        budget: LAST_RESORT,
         progress,
     };
+    let too_many = PackError::TooManyCharts {
+        charts: n,
+        margin: settings.margin_texels,
+        width: settings.width,
+        height: settings.height,
+    };
+    let mut trials = Trials::default();
     if largest <= 0.0 {
-        return search.all_specks(1.0, settings);
+        return fine.once(1.0)?.map(|best| (dense(&best, grid), trials)).ok_or(too_many);
     }
-    // From here on densities are texels to the largest extent: no overflow at any scale of input.
-    let ceiling = f64::from(settings.width).hypot(f64::from(settings.height));
-    let mut density = first_guess((0..n).map(area), settings, grid).min(ceiling);
-    let budget = attempts(n, grid, settings.quality);
-    // Height used goes with the area, or with the length of a single chart.
-    let loosened = |used: f64| if n == 1 { 1.0 / used } else { 1.0 / used.sqrt() };
-    let mut made = 0;
-    let mut best: Option<(f64, Best)> = None;
-    let mut lead: Option<(f64, Strategy)> = None;
-    let mut too_dense = f64::INFINITY;
-    let mut near = false;
-    let (mut step, mut idle, mut shrinks) = (STEP, 0, 0);
-    let mut shapes = search.shapes(density / largest);
-    while made < budget && shrinks < SHRINKS {
-        progress.advance(Stage::Pack, made as f64 / budget as f64);
-        let strategies = match &lead {
-            None if n == 1 => Strategy::portfolio(&shapes, 1),
-            None if !near => Strategy::portfolio(&shapes, BRACKETING),
-            None => Strategy::portfolio(&shapes, if n < MANY { COMPARED } else { VARIED }),
-            Some((used, lead)) => {
-                let keep = used.is_infinite().then(|| lead.clone());
-                let varied = (0..VARIED - usize::from(keep.is_some())).map(|k| lead.varied((made + k) as u64));
-                varied.chain(keep).collect()
-            }
+    // No chart is larger than the texture.
+    let ceiling = f64::from(settings.width).hypot(f64::from(settings.height)) / largest;
+    let guess = (first_guess((0..n).map(area), settings, grid) / largest).min(ceiling);
+    let mut sketches = Vec::new();
+    for effort in Effort::new(n, settings.quality) {
+        let coarse = Grid::coarse(settings, (effort.across * (n as f64).sqrt()).clamp(effort.least, effort.most));
+        let lattice = |o: &Outline| (COARSENED * coarse.cell / (guess * o.extent)).clamp(1e-6, 0.1);
+        let simple: Vec<Outline> = outlines.par_iter().map(|o| o.coarsened(lattice(o))).collect();
+        let search = Search {
+            outlines: &simple,
+            grid: coarse,
+            growth: growth(settings.margin_texels, coarse),
+            reach: Reach::new(0.0),
+            budget: effort.attempts,
+            ..fine
         };
-        let count = strategies.len();
-        let Some(Attempt { used, layout, strategy }) = search.best_of(&shapes, strategies)? else { break };
-        let before = density;
-        if used <= 1.0 {
-            // Every density tried lies above the best that fitted: this one is better.
-            best = Some((density, Best { shapes, layout, density: density / largest }));
-            near = used > 1.0 - 2.0 * NEAR;
-            if count > BRACKETING {
-                lead = Some((f64::INFINITY, strategy));
-            }
-            (step, idle) = ((2.0 * step).min(STEP), 0);
-            density = (density * loosened(used) * (1.0 + step)).min(ceiling);
-            // While bracketing, do not go back to what was too dense.
-            if lead.is_none() && before < too_dense && density >= too_dense {
-                density = (before * too_dense).sqrt();
-            }
-        } else if let Some((fitted, _)) = &best {
-            near = true;
-            if used < 1.0 + NEAR && count > BRACKETING && lead.as_ref().is_none_or(|l| used <= l.0) {
-                lead = Some((used, strategy));
-            }
-            idle += 1;
-            if idle < PATIENCE && lead.is_some() {
-                made += count;
-                continue;
-            }
-            (step, idle) = ((0.5 * step).max(LEAST_STEP), 0);
-            too_dense = density;
-            let nearer = (fitted * density).sqrt().min(fitted * (1.0 + 4.0 * step));
-            density = nearer.max(fitted * (1.0 + LEAST_STEP));
-            lead = lead.map(|l| (f64::INFINITY, l.1));
-        } else {
-            // Not a part of the search yet.
-            too_dense = density;
-            shrinks += 1;
-            density *= (0.998 * loosened(used)).clamp(0.5, 0.995 - 0.01 * f64::from(shrinks.min(9)));
-            shapes = search.shapes(density / largest);
-            continue;
-        }
-        made += count;
-        if density == before {
-            break;
-        }
-        shapes = search.shapes(density / largest);
+        let found = search.run(guess, ceiling)?;
+        trials.attempts += found.attempts;
+        sketches.extend(most_promising(found.sketches, effort.sketches));
     }
-    match best {
-        Some((_, best)) => Ok((best, grid)),
-        None => search.all_specks(0.5 / largest, settings),
+    let mut refinement = Refinement::new(outlines, grid, ceiling, settings, progress);
+    let refined = refinement.best_of(&sketches)?;
+    trials.placements = refinement.placements;
+    if let Some(dense) = refined {
+        return Ok((dense, trials));
     }
+    // More charts than the coarse grid holds, or a texture of a few texels.
+    let found = fine.run(guess, ceiling)?;
+    trials.attempts += found.attempts;
+    let best = match found.best {
+        Some(best) => Some(best),
+        // Every chart a speck or a point: whether they fit at all.
+        None => fine.once(0.5 / largest)?,
+    };
+    best.map(|best| (dense(&best, grid), trials)).ok_or(too_many)
 }
 
-/// How many attempts the search may make.
-fn attempts(charts: usize, grid: Grid, quality: Quality) -> usize {
-    if charts == 1 {
-        return 24;
+/// Base angles to try, by chart; `areas` tell which are large.
+fn turns(outlines: &[Outline], areas: &[f64], grid: Grid, settings: &PackSettings) -> Vec<Vec<[f64; 2]>> {
+    let n = outlines.len();
+    let mut by_area: Vec<usize> = (0..n).collect();
+    by_area.sort_by(|&a, &b| areas[b].total_cmp(&areas[a]).then(a.cmp(&b)));
+    let mut angles = vec![1; n];
+    for &i in by_area.iter().take(LARGE) {
+        angles[i] = ANGLES.div_ceil(n).clamp(LEAST_ANGLES, MOST_ANGLES);
     }
-    // Measured: an attempt costs about so much, in 10 µs on one core.
-    let cost = charts as f64 * grid.rows.max(grid.columns) as f64 / 1.5e5;
-    let (work, least, most) = match quality {
-        Quality::Fast => (80.0, 10.0, 64.0),
-        Quality::High => (800.0, 64.0, 500.0),
+    let turns = |i: usize| match settings.rotation {
+        // The given pose, in the frame of the grid.
+        Rotation::None if grid.sideways => vec![[0.0, 1.0]],
+        rotation => base_turns(&outlines[i], rotation, angles[i]),
     };
-    (work / cost).clamp(least, most) as usize
+    (0..n).into_par_iter().map(turns).collect()
+}
+
+fn dense(best: &Best, grid: Grid) -> Dense {
+    let places = best.shapes.iter().zip(&best.layout.placed).map(|(shape, at)| {
+        at.map(|at| Place {
+            pose: grid.to_texture(shape.footprints[at.footprint].pose(at.x, at.y)),
+            touched: shape.cells as f64 * grid.cell * grid.cell,
+            is_speck: shape.is_speck,
+        })
+    });
+    Dense { places: places.collect(), density: best.density }
 }
 
 /// Density at which squares of the charts' areas, with margin and raster waste added, cover

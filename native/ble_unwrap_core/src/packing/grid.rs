@@ -21,7 +21,9 @@ pub(super) struct Grid {
     pub(super) rows: usize,
     /// The grid's frame is the texture's turned by a quarter: for textures wider than tall.
     pub(super) sideways: bool,
-    border: f64,
+    /// Texels from the frame of the texture to that of the grid.
+    pub(super) border: f64,
+    inner: [f64; 2],
     /// Height of the texture in texels.
     height: f64,
 }
@@ -53,19 +55,46 @@ impl Grid {
         cell = cell.max(shorter / Occupancy::WIDEST as f64).min(shorter - margin);
         let cells = |size: f64| (((size - margin) / cell + 1e-9).floor() as usize).max(1);
         let (columns, rows) = (cells(shorter), cells(longer));
-        Ok(Self { cell, columns, rows, sideways: width > height, border: 0.5 * margin, height })
+        Ok(Self {
+            cell,
+            columns,
+            rows,
+            sideways: width > height,
+            border: 0.5 * margin,
+            inner: [shorter - margin, longer - margin],
+            height,
+        })
+    }
+
+    /// About `across` cells along the longer side of the whole texture, border and all.
+    pub(super) fn coarse(settings: &PackSettings, across: f64) -> Self {
+        let (width, height) = (f64::from(settings.width), f64::from(settings.height));
+        let (shorter, longer) = (width.min(height), width.max(height));
+        let cell = (longer / across).max(shorter / Occupancy::WIDEST as f64).min(shorter);
+        let cells = |size: f64| ((size / cell + 1e-9).floor() as usize).max(1);
+        let (columns, rows) = (cells(shorter), cells(longer));
+        Self { cell, columns, rows, sideways: width > height, border: 0.0, inner: [shorter, longer], height }
+    }
+
+    /// Width and height in texels between the borders, in the grid's frame.
+    pub(super) fn inner(self) -> [f64; 2] {
+        self.inner
     }
 
     /// A pose in cells of the grid as a pose in texels of the texture.
     pub(super) fn to_texture(self, pose: Pose) -> Pose {
-        let scale = pose.scale * self.cell;
-        let offset = pose.offset * self.cell + Vector2::repeat(self.border);
+        self.frame_to_texture(Pose { scale: pose.scale * self.cell, offset: pose.offset * self.cell, ..pose })
+    }
+
+    /// A pose in texels from the grid's corner as a pose in texels of the texture.
+    pub(super) fn frame_to_texture(self, pose: Pose) -> Pose {
+        let offset = pose.offset + Vector2::repeat(self.border);
         if self.sideways {
             // A quarter clockwise, back into the texture.
             let offset = Vector2::new(offset.y, self.height - offset.x);
-            Pose { cos: pose.sin, sin: -pose.cos, scale, offset, ..pose }
+            Pose { cos: pose.sin, sin: -pose.cos, offset, ..pose }
         } else {
-            Pose { scale, offset, ..pose }
+            Pose { offset, ..pose }
         }
     }
 }

@@ -66,10 +66,10 @@ impl Mask {
 
     /// Adds the cells `from..=to` of row `y`.
     pub(super) fn set_run(&mut self, y: usize, from: usize, to: usize) {
+        let to = to.min(self.width.saturating_sub(1));
         if from > to || self.width == 0 {
             return;
         }
-        let to = to.min(self.width - 1);
         let (a, b) = (from >> 6, to >> 6);
         let row = self.row_mut(y);
         if a == b {
@@ -108,9 +108,14 @@ impl Mask {
     }
 
     /// Number of cells.
-    #[cfg(test)]
     pub(super) fn count(&self) -> usize {
         self.words.iter().map(|w| w.count_ones() as usize).sum()
+    }
+
+    /// A number that is the same for equal masks, and hardly ever for others.
+    pub(super) fn key(&self) -> u64 {
+        let fold = |key: u64, word: u64| (key ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29);
+        self.words.iter().fold(fold(self.width as u64, self.height as u64), |key, &word| fold(key, word))
     }
 
     /// Whether no cell is in.
@@ -144,6 +149,26 @@ impl Mask {
                     f(64 * w + rest.trailing_zeros() as usize, y);
                     rest &= rest - 1;
                 }
+            }
+        }
+    }
+
+    /// Adds the cells of `other` moved to (x, y), clipped to `columns`.
+    pub(super) fn paste(&mut self, other: &Self, x: isize, y: isize, columns: usize) {
+        let (y0, y1) = (y.max(0), (y + other.height as isize).min(self.height as isize));
+        let (x0, x1) = (x.max(0), (x + other.width as isize).min(columns.min(self.width) as isize));
+        if y0 >= y1 || x0 >= x1 {
+            return;
+        }
+        let (w0, w1) = (x0 as usize >> 6, (x1 as usize - 1) >> 6);
+        let last = span(0, (x1 as usize - 1) & 63);
+        for row in y0..y1 {
+            let source = other.row((row - y) as usize);
+            let target = self.row_mut(row as usize);
+            for (w, t) in target.iter_mut().enumerate().take(w1 + 1).skip(w0) {
+                // Bit 0 of word w is column 64w − x of the other.
+                let bits = word_at(source, 64 * w as isize - x);
+                *t |= if w == w1 { bits & last } else { bits };
             }
         }
     }
@@ -202,6 +227,14 @@ impl Mask {
         }
         out
     }
+}
+
+/// 64 bits of a row from bit `from` on, zeros outside.
+#[inline]
+pub(super) fn word_at(row: &[u64], from: isize) -> u64 {
+    let (w, shift) = (from.div_euclid(64), from.rem_euclid(64));
+    let get = |w: isize| usize::try_from(w).ok().and_then(|w| row.get(w)).copied().unwrap_or(0);
+    if shift == 0 { get(w) } else { get(w) >> shift | get(w + 1) << (64 - shift) }
 }
 
 /// Transposes a block of 64 by 64 bits: bit j of word i goes to bit i of word j. Warren: Hacker's
@@ -337,6 +370,25 @@ mod tests {
                         near |= same || gap(a, x).hypot(gap(b, y)) < distance - 1e-9;
                     });
                     prop_assert_eq!(out.get(x, y), near, "cell {} {} of reach {}", x, y, r);
+                }
+            }
+        }
+
+        #[test]
+        fn pasting_moves_and_clips(
+            width in 1usize..150, columns in 1usize..200, cells in prop::collection::vec((0usize..150, 0usize..9), 1..20),
+            x in -160isize..210, y in -12isize..30,
+        ) {
+            let source = random_mask(width, 9, &cells);
+            let mut target = Mask::new(200, 20);
+            target.set(7, 3);
+            target.paste(&source, x, y, columns);
+            for b in 0..20 {
+                for a in 0..200 {
+                    let (p, q) = (a as isize - x, b as isize - y);
+                    let from = (0..width as isize).contains(&p) && (0..9).contains(&q) && a < columns;
+                    let expected = (a, b) == (7, 3) || from && source.get(p as usize, q as usize);
+                    prop_assert_eq!(target.get(a, b), expected, "cell {} {}", a, b);
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! The occupied cells of the texture, ready to be asked about 64 positions at once.
 
 use super::cover::Square;
-use super::mask::Mask;
+use super::mask::{Mask, word_at};
 
 /// Occupied cells and, for each level k, the positions where a square of side 2^k would meet one.
 ///
@@ -137,14 +137,6 @@ impl Occupancy {
             level.open[y] = row.iter().enumerate().fold(0, |open, (w, &word)| open | u64::from(word != !0) << w);
         }
     }
-}
-
-/// 64 bits of a row from bit `from` on, zeros outside.
-#[inline]
-fn word_at(row: &[u64], from: isize) -> u64 {
-    let (w, shift) = (from.div_euclid(64), from.rem_euclid(64));
-    let get = |w: isize| usize::try_from(w).ok().and_then(|w| row.get(w)).copied().unwrap_or(0);
-    if shift == 0 { get(w) } else { get(w) >> shift | get(w + 1) << (64 - shift) }
 }
 
 #[cfg(test)]

@@ -10,6 +10,9 @@ pub(super) struct Strategy {
     pub(super) goal: Goal,
     /// Charts of higher priority go first; ties by index.
     pub(super) priority: Vec<f64>,
+    /// Where not 0: about half of the poses of each chart are left out, picked by this number. The best
+    /// pose for the place a chart finds is often not the best for those that follow.
+    pub(super) left_out: u64,
 }
 
 /// What makes a chart go first.
@@ -53,13 +56,22 @@ impl Strategy {
                 Size::Box => (w * h) as f64 * cells.powf(0.01),
             }
         };
-        let of = |&(goal, by): &(Goal, Size)| Self { goal, priority: shapes.iter().map(|s| size(s, by)).collect() };
+        let of = |&(goal, by): &(Goal, Size)| Self {
+            goal,
+            priority: shapes.iter().map(|s| size(s, by)).collect(),
+            left_out: 0,
+        };
         PORTFOLIO.iter().take(count).map(of).collect()
     }
 
     /// A neighbour of this strategy, number `number` of as many as one likes.
     pub(super) fn varied(&self, number: u64) -> Self {
         let mut new = self.clone();
+        match random(number, u64::MAX - 3) % 4 {
+            0 | 1 => new.left_out = random(number, u64::MAX - 4) | 1,
+            2 => new.left_out = 0,
+            _ => {}
+        }
         let spread = SPREADS[(number % SPREADS.len() as u64) as usize];
         let few = random(number, u64::MAX).is_multiple_of(2);
         for (i, p) in new.priority.iter_mut().enumerate() {
@@ -78,6 +90,11 @@ impl Strategy {
             new.goal = PORTFOLIO[(random(number, u64::MAX - 2) % 4) as usize].0;
         }
         new
+    }
+
+    /// Whether pose `pose` of chart `chart` is left out.
+    pub(super) fn leaves_out(&self, chart: usize, pose: usize) -> bool {
+        self.left_out != 0 && random(self.left_out.wrapping_add(chart as u64), pose as u64) & 1 == 0
     }
 
     /// Indices of the charts, first to last.

@@ -1,5 +1,7 @@
 //! The boundary of a set of triangles, for rasters that do not depend on their number.
 
+use std::collections::HashMap;
+
 use nalgebra::Point2;
 use robust::{Coord, orient2d};
 
@@ -75,7 +77,7 @@ impl Outline {
             }
         }
         half.sort_unstable();
-        let mut new_index = std::collections::HashMap::new();
+        let mut new_index = HashMap::new();
         let mut points = Vec::new();
         let mut edges = Vec::new();
         let mut keep = |v: u32| {
@@ -93,6 +95,42 @@ impl Outline {
             }
         }
         Ok(Self { points, edges, area, centre, extent })
+    }
+
+    /// The outline with its vertices moved together on a lattice of `step` units, which leaves far fewer
+    /// edges: for rasters of cells much larger than that. Every vertex moves by at most `step`; the
+    /// chain stays closed, for its boundary moves along.
+    pub(super) fn coarsened(&self, step: f64) -> Self {
+        let mut new_index: HashMap<(i64, i64), u32> = HashMap::new();
+        let mut points = Vec::new();
+        let of = |p: &Point2<f64>| {
+            let key = ((p.x / step).round() as i64, (p.y / step).round() as i64);
+            *new_index.entry(key).or_insert_with(|| {
+                points.push(*p);
+                points.len() as u32 - 1
+            })
+        };
+        let to: Vec<u32> = self.points.iter().map(of).collect();
+        let mut moved: Vec<(u32, u32, i32)> = self
+            .edges
+            .iter()
+            .map(|e| {
+                let (from, to) = (to[e.from as usize], to[e.to as usize]);
+                if from < to { (from, to, e.winding) } else { (to, from, -e.winding) }
+            })
+            .collect();
+        moved.sort_unstable();
+        let mut edges = Vec::with_capacity(moved.len());
+        for same in moved.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            let (from, to) = (same[0].0, same[0].1);
+            let winding: i32 = same.iter().map(|e| e.2).sum();
+            // What has shrunk to a line or a point is still there.
+            if from != to || edges.is_empty() {
+                let (from, to) = if winding >= 0 { (from, to) } else { (to, from) };
+                edges.push(Edge { from, to, winding: winding.abs() });
+            }
+        }
+        Self { points, edges, ..*self }
     }
 
     /// What one unit of `points` is in the chart plane.
@@ -135,6 +173,41 @@ mod tests {
         let wire = outline(&points, &[[0, 3, 1]]);
         assert!(wire.edges.len() == 3 && wire.edges.iter().all(|e| e.winding == 0));
         assert_eq!(wire.area, 0.0);
+    }
+
+    #[test]
+    fn coarsening_keeps_the_chain_closed_and_the_shape() {
+        // A ring of 2 × 600 edges whose inner circle is too fine for the lattice of a twentieth.
+        let n = 600u32;
+        let circle = |r: f64| {
+            (0..n).map(move |k| {
+                let t = std::f64::consts::TAU * f64::from(k) / f64::from(n);
+                [r * t.cos(), r * t.sin()]
+            })
+        };
+        let points: Vec<[f64; 2]> = circle(1.0).chain(circle(0.3)).collect();
+        let triangles: Vec<[u32; 3]> = (0..n)
+            .flat_map(|k| {
+                let next = (k + 1) % n;
+                [[k, next, n + k], [next, n + next, n + k]]
+            })
+            .collect();
+        let fine = outline(&points, &triangles);
+        let coarse = fine.coarsened(0.05);
+        assert!(coarse.edges.len() * 5 < fine.edges.len(), "{} edges", coarse.edges.len());
+        let mut flow = vec![0; coarse.points.len()];
+        for e in &coarse.edges {
+            flow[e.from as usize] -= e.winding;
+            flow[e.to as usize] += e.winding;
+        }
+        assert!(flow.iter().all(|&f| f == 0), "as many edges arrive as leave");
+        let area = |o: &Outline| -> f64 {
+            let at = |v: u32| o.points[v as usize].coords;
+            o.edges.iter().map(|e| 0.5 * f64::from(e.winding) * at(e.from).perp(&at(e.to))).sum()
+        };
+        assert!((area(&coarse) / area(&fine) - 1.0).abs() < 0.1, "{} of {}", area(&coarse), area(&fine));
+        // However coarse, something is left.
+        assert!(!fine.coarsened(9.0).edges.is_empty());
     }
 
     #[test]

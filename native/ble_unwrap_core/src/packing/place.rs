@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 
-use super::mask::{Mask, Reach};
+use super::mask::Reach;
 use super::occupancy::Occupancy;
+use super::order::Strategy;
 use super::shape::{Footprint, Shape};
 use crate::{Cancelled, Progress};
 
@@ -53,17 +54,17 @@ impl Goal {
 
 /// Footprints that share the row where their search begins.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
-enum Kind<'a> {
+enum Kind {
     /// The same cells: where one found no place, nor does another.
-    Same(&'a Mask),
+    Same(u64),
     /// Width, height and share of cells to about an eighth: nearly so.
     Alike(usize, usize, usize),
 }
 
-impl<'a> Kind<'a> {
-    fn of(f: &'a Footprint, alike: bool) -> Self {
+impl Kind {
+    fn of(f: &Footprint, alike: bool) -> Self {
         if !alike {
-            return Self::Same(&f.mask);
+            return Self::Same(f.key);
         }
         // Steps of an eighth of the next lower power of two.
         let coarse = |n: usize| n >> n.ilog2().saturating_sub(3) << n.ilog2().saturating_sub(3);
@@ -125,7 +126,7 @@ fn best_position(
     (best, first.unwrap_or(y))
 }
 
-/// Places shapes in the given order on an empty grid of `width` by `height` cells, `reach` apart.
+/// Places shapes as a strategy says on an empty grid of `width` by `height` cells, `reach` apart.
 ///
 /// Stops at the first that finds no place. Cost: about a lookup per word of free space and footprint.
 ///
@@ -133,13 +134,13 @@ fn best_position(
 /// [`Cancelled`].
 pub(super) fn place(
     shapes: &[Shape],
-    order: &[usize],
+    strategy: &Strategy,
     [width, height]: [usize; 2],
     reach: &Reach,
-    goal: Goal,
     alike: bool,
     progress: &Progress,
 ) -> Result<Layout, Cancelled> {
+    let order = strategy.order();
     // Highest level still asked about, from each place in the order on.
     let mut top_from = vec![0u32; order.len() + 1];
     for (k, &i) in order.iter().enumerate().rev() {
@@ -149,14 +150,18 @@ pub(super) fn place(
     let mut grid = Occupancy::new(width, height, top_from[0]);
     let mut layout = Layout { placed: vec![None; shapes.len()], rows: 0, missing: 0 };
     // Space only gets less: a footprint seen before has no place below the row where it last had one.
-    let mut first_rows: HashMap<Kind<'_>, usize> = HashMap::new();
+    let mut first_rows: HashMap<Kind, usize> = HashMap::new();
     for (k, &i) in order.iter().enumerate() {
         progress.check()?;
         let mut best: Option<(f64, Placed)> = None;
+        let none_left = (0..shapes[i].footprints.len()).all(|n| strategy.leaves_out(i, n));
         for (n, f) in shapes[i].footprints.iter().enumerate() {
+            if !none_left && strategy.leaves_out(i, n) {
+                continue;
+            }
             let first_row = first_rows.entry(Kind::of(f, alike)).or_insert(0);
             let limit = best.map_or(f64::INFINITY, |b| b.0);
-            let (found, first) = best_position(&grid, f, goal, *first_row, limit);
+            let (found, first) = best_position(&grid, f, strategy.goal, *first_row, limit);
             *first_row = first;
             if let Some((cost, x, y)) = found {
                 best = Some((cost, Placed { footprint: n, x, y }));

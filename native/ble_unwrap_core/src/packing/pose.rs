@@ -7,26 +7,22 @@ use nalgebra::Point2;
 use super::Rotation;
 use super::outline::Outline;
 
-/// Angles tried besides the minimum-area rectangle's, for large charts, as shares of a quarter turn.
-/// Quarter turns of each come for free, so two of them are eight poses.
-const MORE_ANGLES: [f64; 2] = [1.0 / 3.0, 2.0 / 3.0];
 /// Angles compared for a chart alone in the texture, over half a turn.
 const ALONE: usize = 720;
 
 /// Cosine and sine of the base angles of a chart; the other poses are quarter turns of these.
 ///
 /// The first lays the minimum-area rectangle flat ([`Rotation::Any`]) or is the given pose.
-pub(super) fn base_turns(outline: &Outline, rotation: Rotation, large: bool) -> Vec<[f64; 2]> {
+pub(super) fn base_turns(outline: &Outline, rotation: Rotation, angles: usize) -> Vec<[f64; 2]> {
     if rotation != Rotation::Any {
         return vec![[1.0, 0.0]];
     }
     let first = flat_turn(outline);
-    let more = if large { &MORE_ANGLES[..] } else { &[] };
-    let turned = |&share: &f64| {
-        let (s, c) = (share * FRAC_PI_2).sin_cos();
+    let turned = |k: usize| {
+        let (s, c) = (k as f64 / angles as f64 * FRAC_PI_2).sin_cos();
         [first[0] * c - first[1] * s, first[1] * c + first[0] * s]
     };
-    std::iter::once(first).chain(more.iter().map(turned)).collect()
+    std::iter::once(first).chain((1..angles).map(turned)).collect()
 }
 
 /// The turn in which a chart alone fits a rectangle of `inner` width and height at the largest scale:
@@ -197,12 +193,12 @@ mod tests {
     fn turns_are_rotations_and_as_many_as_asked() {
         let points = [Point2::new(0.0, 0.0), Point2::new(3.0, 1.0), Point2::new(1.0, 2.0)];
         let o = outline(&points);
-        let turns = base_turns(&o, Rotation::Any, true);
+        let turns = base_turns(&o, Rotation::Any, 3);
         assert_eq!(turns.len(), 3);
         assert!(turns.iter().all(|[c, s]| (c * c + s * s - 1.0).abs() < 1e-14));
-        assert_eq!(base_turns(&o, Rotation::Any, false).len(), 1);
-        assert_eq!(base_turns(&o, Rotation::Quarter, true), vec![[1.0, 0.0]]);
+        assert_eq!(base_turns(&o, Rotation::Any, 1).len(), 1);
+        assert_eq!(base_turns(&o, Rotation::Quarter, 3), vec![[1.0, 0.0]]);
         let empty = Outline::new(&PackItem { points: &[], triangles: &[] }, 0).expect("empty");
-        assert_eq!(base_turns(&empty, Rotation::Any, false), vec![[1.0, 0.0]]);
+        assert_eq!(base_turns(&empty, Rotation::Any, 1), vec![[1.0, 0.0]]);
     }
 }

@@ -18,7 +18,8 @@ pub(super) struct Raster {
 ///
 /// Guarantee: a cell outside the mask is at least `inflation` cells from every triangle in the
 /// maximum norm, as long as `inflation` exceeds 1e-9 times the mask's extent (rounding). No cell is
-/// set that is further than that. Cost: O(cells of the boundary + words of the mask).
+/// set that is further than that. With a negative inflation (more than −½) cells are left out that the
+/// outline enters by less than that; one cell is set at least. Cost: O(cells of the boundary + words of the mask).
 pub(super) fn rasterise(outline: &Outline, turn: [f64; 2], scale: f64, inflation: f64) -> Raster {
     let [c, s] = turn;
     let mut at: Vec<Point2<f64>> =
@@ -47,6 +48,10 @@ pub(super) fn rasterise(outline: &Outline, turn: [f64; 2], scale: f64, inflation
         }
     }
     fill(&mut mask, &mut crossings);
+    if mask.is_empty() {
+        let (x, y) = (mask.width() / 2, mask.height() / 2);
+        mask.set_run(y, x, x);
+    }
     Raster { mask, shift }
 }
 
@@ -54,6 +59,9 @@ pub(super) fn rasterise(outline: &Outline, turn: [f64; 2], scale: f64, inflation
 fn cover_segment(mask: &mut Mask, p: Point2<f64>, q: Point2<f64>, e: f64) {
     let (p, q) = if p.y <= q.y { (p, q) } else { (q, p) };
     let clamp = |v: f64, n: usize| (v.floor().max(0.0) as usize).min(n - 1);
+    if q.y + e < 0.0 || q.y + e < (p.y - e).floor() {
+        return;
+    }
     let (first, last) = (clamp(p.y - e, mask.height()), clamp(q.y + e, mask.height()));
     let slope = (q.x - p.x) / (q.y - p.y);
     for row in first..=last {
@@ -166,6 +174,21 @@ mod tests {
                 prop_assert!(p.x < raster.mask.width() as f64 && p.y < raster.mask.height() as f64);
             }
         }
+    }
+
+    #[test]
+    fn a_negative_inflation_leaves_out_cells_barely_touched() {
+        let points: Vec<_> = [[0.0, 0.0], [1.0, 0.1], [0.9, 0.8], [0.1, 0.7]].map(|[x, y]| Point2::new(x, y)).into();
+        let outline =
+            Outline::new(&PackItem { points: &points, triangles: &[[0, 1, 2], [0, 2, 3]] }, 0).expect("valid");
+        let area = outline.area * 50.0 * 50.0;
+        let count = |inflation: f64| rasterise(&outline, [0.8, 0.6], 50.0, inflation).mask.count() as f64;
+        let perimeter = 3.2 * 50.0;
+        assert!((count(-0.499) - area).abs() < 0.1 * perimeter, "{} cells for an area of {area}", count(-0.499));
+        assert!(count(0.0) - area > 0.4 * perimeter);
+        assert!(count(-0.25) < count(0.0) && count(-0.25) > count(-0.499));
+        // Even a chart of a tenth of a cell has one.
+        assert_eq!(rasterise(&outline, [1.0, 0.0], 0.1, -0.4).mask.count(), 1);
     }
 
     #[test]

@@ -21,6 +21,25 @@ const SPECK_TEXELS: f64 = 1.0 - 4.0 * SAFETY_TEXELS;
 /// all alike, and a chart like one placed before is found a place where that search ended.
 const BOX_CELLS: usize = 6;
 
+/// How large a chart is drawn.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scale {
+    /// Cells to an outline unit.
+    pub(super) cells: f64,
+    /// Whether the chart was scaled up to a texel.
+    pub(super) is_speck: bool,
+}
+
+impl Scale {
+    /// At `density` texels to a unit of the chart plane, on cells of `cell` texels.
+    pub(super) fn new(outline: &Outline, density: f64, cell: f64) -> Self {
+        let extent = density * outline.extent;
+        // A chart without extent is a point at any scale.
+        let cells = if outline.extent == 0.0 { density } else { extent.max(SPECK_TEXELS) } / cell;
+        Self { cells, is_speck: outline.extent > 0.0 && extent < SPECK_TEXELS }
+    }
+}
+
 /// A footprint: the cells of a chart in one pose.
 #[derive(Clone, Debug)]
 pub(super) struct Footprint {
@@ -30,6 +49,8 @@ pub(super) struct Footprint {
     pub(super) cells: usize,
     /// Mean row of its cells.
     pub(super) centre_y: f64,
+    /// The same for equal masks, and hardly ever for others.
+    pub(super) key: u64,
     /// Chart plane to cells of the mask.
     to_cells: Pose,
 }
@@ -47,15 +68,20 @@ pub(super) struct Shape {
 
 impl Shape {
     /// Footprints at `density` texels to a unit of the chart plane, on cells of `cell` texels.
-    pub(super) fn new(outline: &Outline, turns: &[[f64; 2]], quarters: bool, density: f64, cell: f64) -> Self {
-        let extent = density * outline.extent;
-        let is_speck = outline.extent > 0.0 && extent < SPECK_TEXELS;
-        // Cells to an outline unit; a chart without extent is a point at any scale.
-        let scale = if outline.extent == 0.0 { density } else { extent.max(SPECK_TEXELS) } / cell;
+    /// The charts are grown by `growth` cells before they are rasterised.
+    pub(super) fn new(
+        outline: &Outline,
+        turns: &[[f64; 2]],
+        quarters: bool,
+        density: f64,
+        cell: f64,
+        growth: f64,
+    ) -> Self {
+        let Scale { cells: scale, is_speck } = Scale::new(outline, density, cell);
         let mut footprints: Vec<Footprint> = Vec::new();
         // Without triangles there is nothing to place.
         for &turn in turns.iter().filter(|_| !outline.edges.is_empty()) {
-            let raster = rasterise(outline, turn, scale, SAFETY_TEXELS / cell);
+            let raster = rasterise(outline, turn, scale, growth);
             let mut mask = raster.mask;
             let tiny = mask.width().max(mask.height()) <= BOX_CELLS;
             if tiny {
@@ -75,7 +101,7 @@ impl Shape {
                     to_cells = to_cells.quarter_turn(mask.height() as f64);
                     mask = mask.quarter_turn();
                 }
-                if !footprints.iter().any(|f| f.mask == mask) {
+                if !footprints.iter().any(|f| f.key == mask.key() && f.mask == mask) {
                     footprints.push(Footprint::new(mask.clone(), squares.clone(), to_cells));
                 }
                 if tiny || !quarters {
@@ -99,7 +125,8 @@ impl Footprint {
             moment += (y as f64 + 0.5) * count as f64;
             cells += count;
         }
-        Self { mask, squares, cells, centre_y: moment / cells.max(1) as f64, to_cells }
+        let key = mask.key();
+        Self { mask, squares, cells, key, centre_y: moment / cells.max(1) as f64, to_cells }
     }
 
     /// Chart plane to cells of the grid, with the mask's corner at cell (x, y).

@@ -1,17 +1,19 @@
 //! Surface to charts: flatten a patch, accept the chart or split the patch, until all are charts.
 
 use std::cell::OnceCell;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use crate::charts::{self, Chart, Patch};
-use crate::geodesics::{self, LandmarkDistances};
-use crate::mesh::Topology;
-use crate::progress::{Cancelled, Progress};
-use crate::segmentation::{self, SpectralAnalysis};
+use crate::geodesics::LandmarkDistances;
+use crate::mesh::{Topology, VertexId};
+use crate::progress::Cancelled;
+use crate::segmentation::{self, Segmentation, SpectralAnalysis};
 use crate::settings::{Holes, Settings};
 
 use super::flatten::{self, Flat};
+use super::memo::{Fingerprint, Kind, Run};
 use super::rungs::{Rung, Rungs};
 
 /// Patches less planar than this are split before any flattening. Far below what the embedding alone would
@@ -23,10 +25,18 @@ const MOST_SPECTRAL_SPLITS: u32 = 24;
 /// Below this many faces a patch is not worth a cut for its handles: it is split.
 const LEAST_FACES_TO_CUT: usize = 8;
 
+/// Of landmarks a trial takes one in so many of the bounds set: it only has to begin near the minimum, and on five
+/// development models 24 to 32 gave as many charts as 48 to 64, with a third less time for distances.
+const TRIAL_SHARE: usize = 2;
+
+/// A part takes over the distances of the patch it was split from if so many of the landmarks lie in it.
+const LEAST_INHERITED: usize = 16;
+
 /// The charts of a surface and how they came about.
 pub(super) struct Charting {
     pub(super) charts: Vec<Chart>,
-    /// For each chart, the split in two that it came out of, if any.
+    /// For each chart, the split that it came out of, if any; the same for both halves of a split in two, and else for no
+    /// other.
     pub(super) family: Vec<Option<u32>>,
     pub(super) rungs: Rungs,
 }
@@ -35,11 +45,13 @@ struct Piece {
     patch: Patch,
     splits: u32,
     family: Option<u32>,
+    /// Distances taken over from the patch it was split from.
+    inherited: Option<LandmarkDistances>,
 }
 
 enum Step {
     Accept(Box<Chart>),
-    Split(Vec<Patch>),
+    Split(Vec<(Patch, Option<LandmarkDistances>)>),
 }
 
 /// Cuts and flattens patches until every chart is under the limit. Rounds over all open pieces, in
@@ -50,9 +62,10 @@ pub(super) fn chart(
     patches: Vec<Patch>,
     settings: &Settings,
     done: &(dyn Fn(f64) + Sync),
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Charting, Cancelled> {
-    let mut open: Vec<Piece> = patches.into_iter().map(|patch| Piece { patch, splits: 0, family: None }).collect();
+    let whole = |patch| Piece { patch, splits: 0, family: None, inherited: None };
+    let mut open: Vec<Piece> = patches.into_iter().map(whole).collect();
     let mut accepted: Vec<(Chart, Option<u32>)> = Vec::new();
     let mut rungs = Rungs::default();
     let mut split_count = 0;
@@ -78,10 +91,14 @@ pub(super) fn chart(
                 Step::Accept(chart) => {
                     accepted.push((*chart, piece.family));
                 }
-                Step::Split(patches) => {
-                    let family = (patches.len() == 2).then_some(split_count);
+                Step::Split(parts) => {
+                    let splits = piece.splits + 1;
+                    let halves = parts.len() == 2;
+                    for (patch, inherited) in parts {
+                        next.push(Piece { patch, splits, family: Some(split_count), inherited });
+                        split_count += u32::from(!halves);
+                    }
                     split_count += 1;
-                    next.extend(patches.into_iter().map(|patch| Piece { patch, splits: piece.splits + 1, family }));
                 }
             }
         }
@@ -92,22 +109,11 @@ pub(super) fn chart(
     Ok(Charting { charts, family, rungs })
 }
 
-/// Flattens a patch as it is or with the cuts its topology needs; `None` where no such chart would be
-/// under the limit.
-pub(super) fn try_chart(
-    patch: &Patch,
-    settings: &Settings,
-    rungs: &mut Rungs,
-    progress: &Progress,
-) -> Result<Option<Chart>, Cancelled> {
-    Attempt::new(patch, settings, progress).run(rungs)
-}
-
-fn step(piece: &Piece, settings: &Settings, progress: &Progress) -> Result<(Step, Rungs), Cancelled> {
+fn step(piece: &Piece, settings: &Settings, progress: &Run<'_>) -> Result<(Step, Rungs), Cancelled> {
     progress.check()?;
     let (patch, splits) = (&piece.patch, piece.splits);
     let mut rungs = Rungs::default();
-    let attempt = Attempt::new(patch, settings, progress);
+    let attempt = Attempt::new(patch, piece.inherited.as_ref(), settings, progress);
     if patch.is_one_polygon() {
         let chart = attempt.polygon(&mut rungs)?;
         return Ok((Step::Accept(Box::new(chart)), rungs));
@@ -115,38 +121,93 @@ fn step(piece: &Piece, settings: &Settings, progress: &Progress) -> Result<(Step
     if let Some(chart) = attempt.run(&mut rungs)? {
         return Ok((Step::Accept(Box::new(chart)), rungs));
     }
-    let parts = if splits < MOST_SPECTRAL_SPLITS {
-        rungs.take(Rung::Split);
-        let (distances, analysis) = attempt.analysis()?;
-        let cuts = &settings.segmentation;
-        segmentation::segment(&patch.mesh, &patch.polygon, distances, analysis, splits == 0, cuts, progress)?
-    } else {
-        rungs.take(Rung::Bisect);
-        segmentation::bisect(&patch.mesh, &patch.polygon)
-    };
-    Ok((Step::Split(patch.split(&parts.label, parts.parts)), rungs))
+    let parts = attempt.split(splits, &mut rungs)?;
+    let inherited: Vec<_> = parts.iter().map(|part| attempt.heritage(part)).collect();
+    Ok((Step::Split(parts.into_iter().zip(inherited).collect()), rungs))
+}
+
+/// The parts of a patch that is known not to be one chart, and that is not one polygon.
+pub(super) fn split(
+    patch: &Patch,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Run<'_>,
+) -> Result<Vec<Patch>, Cancelled> {
+    Attempt::new(patch, None, settings, progress).split(1, rungs)
 }
 
 /// One patch under trial: its topology, and its distances once somebody asks.
 struct Attempt<'a> {
     patch: &'a Patch,
     topology: Topology,
+    inherited: Option<&'a LandmarkDistances>,
     settings: &'a Settings,
-    progress: &'a Progress,
-    measured: OnceCell<(LandmarkDistances, SpectralAnalysis)>,
+    progress: &'a Run<'a>,
+    measured: OnceCell<Arc<(LandmarkDistances, SpectralAnalysis)>>,
 }
 
 impl<'a> Attempt<'a> {
-    fn new(patch: &'a Patch, settings: &'a Settings, progress: &'a Progress) -> Self {
-        Self { patch, topology: patch.mesh.topology(), settings, progress, measured: OnceCell::new() }
+    fn new(
+        patch: &'a Patch,
+        inherited: Option<&'a LandmarkDistances>,
+        settings: &'a Settings,
+        progress: &'a Run<'a>,
+    ) -> Self {
+        Self { patch, topology: patch.mesh.topology(), inherited, settings, progress, measured: OnceCell::new() }
     }
 
     fn analysis(&self) -> Result<&(LandmarkDistances, SpectralAnalysis), Cancelled> {
         if let Some(known) = self.measured.get() {
             return Ok(known);
         }
-        let fresh = analyse(self.patch, self.settings, self.progress)?;
+        let fresh = match self.inherited {
+            Some(distances) => Arc::new((distances.clone(), SpectralAnalysis::new(distances))),
+            None => analyse(self.patch, self.settings, self.progress)?,
+        };
         Ok(self.measured.get_or_init(|| fresh))
+    }
+
+    /// Parts by spectral segmentation, or halves after that has been tried so often; `splits` is 0 for a component.
+    fn split(&self, splits: u32, rungs: &mut Rungs) -> Result<Vec<Patch>, Cancelled> {
+        let (patch, progress) = (self.patch, self.progress);
+        let parts = if splits < MOST_SPECTRAL_SPLITS {
+            rungs.take(Rung::Split);
+            let (distances, analysis) = self.analysis()?;
+            let cuts = &self.settings.segmentation;
+            let first = splits == 0;
+            let input = |f: &mut Fingerprint| {
+                f.mesh(&patch.mesh);
+                f.numbers(&patch.polygon);
+                f.distances(distances);
+                f.indices([usize::from(first)]);
+                f.settings(cuts);
+            };
+            progress.recall(
+                Kind::Segments,
+                input,
+                |s: &Segmentation| 4 * s.label.len(),
+                || segmentation::segment(&patch.mesh, &patch.polygon, distances, analysis, first, cuts, progress),
+            )?
+        } else {
+            rungs.take(Rung::Bisect);
+            Arc::new(segmentation::bisect(&patch.mesh, &patch.polygon))
+        };
+        Ok(patch.split(&parts.label, parts.parts))
+    }
+
+    /// The distances that a part of this patch takes over, if it has enough of them.
+    fn heritage(&self, part: &Patch) -> Option<LandmarkDistances> {
+        let (distances, _) = &**self.measured.get()?;
+        if !self.settings.coarse || distances.len() < LEAST_INHERITED {
+            return None;
+        }
+        let mut own: Vec<(VertexId, VertexId)> =
+            self.patch.vertices.iter().enumerate().map(|(i, v)| (*v, VertexId::new(i))).collect();
+        own.sort_unstable();
+        let find = |v: &VertexId| own.binary_search_by_key(v, |e| e.0).ok().map(|at| own[at].1);
+        let vertices: Option<Vec<VertexId>> = part.vertices.iter().map(find).collect();
+        let taken = distances.restricted(&vertices?);
+        (taken.len() >= LEAST_INHERITED).then_some(taken)
     }
 
     /// A chart whatever its stretch, for a patch that cannot be split.
@@ -165,8 +226,14 @@ impl<'a> Attempt<'a> {
             if let Some(flat) = flatten::isometric(patch, rungs) {
                 return Ok(Some(flat.into_chart(patch.clone())));
             }
-            let (distances, analysis) = self.analysis()?;
-            if let Some(flat) = self.flatten(patch, distances, analysis, rungs)? {
+            let flat = match flatten::projected(patch, self.settings, rungs, self.progress)? {
+                Some(verdict) => verdict,
+                None => {
+                    let (distances, analysis) = self.analysis()?;
+                    self.flatten(patch, distances, analysis, rungs)?
+                }
+            };
+            if let Some(flat) = flat {
                 return Ok(Some(flat.into_chart(patch.clone())));
             }
         }
@@ -175,7 +242,7 @@ impl<'a> Attempt<'a> {
         if self.topology.is_disk() || blob || patch.faces.len() < LEAST_FACES_TO_CUT {
             return Ok(None);
         }
-        let length = |h| patch.mesh.edge_length(h);
+        let length = |h| patch.mesh.edge_length(h) * patch.mesh.border_cost(h);
         let diagonal = |h| patch.is_diagonal(h);
         if self.topology.genus() > 0 && self.settings.holes == Holes::Keep {
             let open = patch.cut(&charts::cut_open(&patch.mesh, length, diagonal));
@@ -193,8 +260,9 @@ impl<'a> Attempt<'a> {
         if let Some(flat) = flatten::isometric(&open, rungs) {
             return Ok(Some(flat.into_chart(open)));
         }
-        let (distances, analysis) = analyse(&open, self.settings, self.progress)?;
-        Ok(self.flatten(&open, &distances, &analysis, rungs)?.map(|flat| flat.into_chart(open)))
+        let known = analyse(&open, self.settings, self.progress)?;
+        let (distances, analysis) = &*known;
+        Ok(self.flatten(&open, distances, analysis, rungs)?.map(|flat| flat.into_chart(open)))
     }
 
     fn flatten(
@@ -214,9 +282,21 @@ impl<'a> Attempt<'a> {
 fn analyse(
     patch: &Patch,
     settings: &Settings,
-    progress: &Progress,
-) -> Result<(LandmarkDistances, SpectralAnalysis), Cancelled> {
-    let distances = geodesics::landmark_distances(&patch.mesh, &settings.geodesics, progress)?;
-    let analysis = SpectralAnalysis::new(&distances);
-    Ok((distances, analysis))
+    progress: &Run<'_>,
+) -> Result<Arc<(LandmarkDistances, SpectralAnalysis)>, Cancelled> {
+    let mut geodesics = settings.geodesics.clone();
+    if settings.coarse {
+        geodesics.landmark_min = geodesics.landmark_min.div_ceil(TRIAL_SHARE);
+        geodesics.landmark_max = geodesics.landmark_max.div_ceil(TRIAL_SHARE);
+    }
+    let input = |f: &mut Fingerprint| {
+        f.mesh(&patch.mesh);
+        f.settings(&geodesics);
+    };
+    let bytes = |known: &(LandmarkDistances, SpectralAnalysis)| 4 * known.0.len() * known.0.vertex_count();
+    progress.recall(Kind::Analysis, input, bytes, || {
+        let distances = crate::geodesics::landmark_distances(&patch.mesh, &geodesics, progress)?;
+        let analysis = SpectralAnalysis::new(&distances);
+        Ok((distances, analysis))
+    })
 }

@@ -1,18 +1,28 @@
 //! One connected surface to charts, by way of a coarse mesh where it is large.
 //!
 //! Where to cut hardly depends on detail: a component of many vertices is collapsed, cut into charts and
-//! merged on the coarse mesh, where every trial costs milliseconds; the labels are prolonged, their
-//! borders redrawn on the fine mesh, and each part is flattened there once.
+//! merged on the coarse mesh, where every trial costs milliseconds. Labels and positions in the plane are prolonged,
+//! the borders redrawn on the fine mesh, and each part is polished there. A part that detail brings over the limit
+//! goes back to the coarse mesh to be split.
+
+use std::cmp::Reverse;
+use std::sync::Arc;
+
+use rayon::prelude::*;
 
 use crate::charts::{Chart, Patch};
-use crate::mesh::{self, FaceId};
-use crate::progress::{Cancelled, Progress};
-use crate::segmentation;
+use crate::mesh::{self, Coarse, FaceId, HalfedgeId};
+use crate::progress::Cancelled;
+use crate::segmentation::{self, Segmentation};
 use crate::settings::Settings;
 
-use super::charting;
+use super::charting::{self, Charting};
+use super::darts::{self, Sewn};
+use super::flatten;
+use super::memo::{self, Fingerprint, Kind, Run};
 use super::merge::{self, Which};
-use super::rungs::Rungs;
+use super::prolong::{Prolonged, prolong};
+use super::rungs::{Rung, Rungs};
 use super::tally::Tally;
 
 /// Components of more vertices are charted on a coarse mesh.
@@ -21,7 +31,7 @@ const COARSE_ABOVE: usize = 3_000;
 const COARSE_SHARE: f64 = 0.05;
 /// and never fewer or more than these. Below, features of the size of a chart's width vanish; above, the trials
 /// cost more than the fine flattening.
-const COARSE_VERTICES: (usize, usize) = (1_500, 4_000);
+const COARSE_VERTICES: (usize, usize) = (1_500, 20_000);
 /// On the coarse mesh the stretch above 1 must stay under this share of what the limit allows: detail
 /// that the collapse removed adds some.
 const COARSE_ALLOWANCE: f64 = 0.6;
@@ -31,7 +41,11 @@ const BAND_RINGS: usize = 10;
 /// On the fine mesh only charts that a split there has made are joined again, and only up to so many faces: the
 /// others have been tried on the coarse mesh, and a trial costs what flattening them did. On a body with fingers
 /// and ears 1,200 instead of 6,000 saves a quarter of the time and costs 5 % more charts.
-const FINE_UNION: usize = 1_200;
+const FINE_UNION: usize = 20_000;
+/// A part that is over the limit is split on the coarse mesh only while it has more faces there than this, and
+const LEAST_COARSE_FACES: usize = 60;
+/// more than this on the fine mesh: below, charting it there costs no more.
+const LEAST_FINE_FACES: usize = 1_500;
 /// Share of the work on a component that the coarse mesh takes.
 const COARSE_WORK: f64 = 0.4;
 
@@ -40,19 +54,21 @@ pub(super) fn charts(
     patch: &Patch,
     settings: &Settings,
     tally: &Tally<'_>,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<(Vec<Chart>, Rungs), Cancelled> {
     let fine = Whole::new(patch.mesh.clone(), patch.polygon.clone());
     let size = patch.faces.len() as f64;
     let mut rungs = Rungs::default();
     let mut charts = if patch.mesh.vertex_count() > COARSE_ABOVE && settings.coarse {
-        let parts = fine.parts_by_coarse_mesh(settings, &mut rungs, progress)?;
+        let coarse = OnCoarse::new(&fine, settings, progress)?;
+        let parts = coarse.parts(&mut rungs, progress)?;
         tally.add(size, COARSE_WORK);
         let done = |faces| tally.add(faces, 1.0 - COARSE_WORK);
-        fine.charts(parts, Which::AfterSplits { most_faces: FINE_UNION }, settings, &mut rungs, &done, progress)?
+        let charting = coarse.polish(parts, &done, &mut rungs, progress)?;
+        fine.merge(charting, Which::AfterSplits { most_faces: FINE_UNION }, settings, &mut rungs, progress)?
     } else {
-        let parts = vec![fine.patch.clone()];
-        fine.charts(parts, Which::All, settings, &mut rungs, &|faces| tally.add(faces, 1.0), progress)?
+        let charts = fine.charts(settings, &mut rungs, &|faces| tally.add(faces, 1.0), progress)?;
+        fine.sew(charts, settings, &mut rungs, progress)?.into_iter().map(|sewn| sewn.chart).collect()
     };
     for f in charts.iter_mut().flat_map(|c| &mut c.patch.faces) {
         *f = patch.faces[f.index()];
@@ -72,18 +88,40 @@ impl Whole {
         Self { patch: Patch { mesh, faces, vertices, polygon } }
     }
 
-    /// Charts parts of this mesh and joins them again where they need not be apart.
+    /// Charts this mesh and joins charts that need not be apart.
     fn charts(
         &self,
-        parts: Vec<Patch>,
-        which: Which,
         settings: &Settings,
         rungs: &mut Rungs,
         done: &(dyn Fn(f64) + Sync),
-        progress: &Progress,
+        progress: &Run<'_>,
     ) -> Result<Vec<Chart>, Cancelled> {
-        let charting = charting::chart(parts, settings, done, progress)?;
+        let charting = charting::chart(vec![self.patch.clone()], settings, done, progress)?;
         rungs.add(&charting.rungs);
+        self.merge(charting, Which::All, settings, rungs, progress)
+    }
+
+    /// Sews charts of this mesh together.
+    fn sew(
+        &self,
+        charts: Vec<Chart>,
+        settings: &Settings,
+        rungs: &mut Rungs,
+        progress: &Run<'_>,
+    ) -> Result<Vec<Sewn>, Cancelled> {
+        let (sewn, steps) = darts::sew(&self.patch.mesh, &self.patch.polygon, charts, usize::MAX, settings, progress)?;
+        rungs.add(&steps);
+        Ok(sewn)
+    }
+
+    fn merge(
+        &self,
+        charting: Charting,
+        which: Which,
+        settings: &Settings,
+        rungs: &mut Rungs,
+        progress: &Run<'_>,
+    ) -> Result<Vec<Chart>, Cancelled> {
         if !settings.merge {
             return Ok(charting.charts);
         }
@@ -92,32 +130,232 @@ impl Whole {
         rungs.add(&steps);
         Ok(charts)
     }
+}
 
-    /// Parts that flatten under the limit on a coarse mesh, prolonged to this one.
-    fn parts_by_coarse_mesh(
-        &self,
-        settings: &Settings,
-        rungs: &mut Rungs,
-        progress: &Progress,
-    ) -> Result<Vec<Patch>, Cancelled> {
+/// A part of the fine mesh and the chart of the coarse mesh that it lies on.
+#[derive(Clone)]
+struct Part {
+    patch: Patch,
+    guide: Chart,
+    /// The number of the guide among all, where it is not sewn.
+    number: usize,
+    /// What it was sewn of, to go back to.
+    pieces: Vec<Part>,
+    /// The split that it came out of, if any; the same for both halves of one in two, and else for no other.
+    family: Option<u32>,
+}
+
+impl Part {
+    /// Whether an edge of the coarse mesh lies between two of the pieces that the guide is sewn of.
+    fn is_border(&self, coarse: &mesh::TriMesh, h: HalfedgeId) -> bool {
+        let piece = |h: HalfedgeId| self.pieces.iter().position(|p| p.guide.patch.faces.contains(&h.face()));
+        !self.pieces.is_empty() && piece(h) != piece(coarse.twin(h))
+    }
+}
+
+enum Outcome {
+    Accept(Box<Chart>),
+    Split(Vec<Part>),
+    /// To be charted on the fine mesh alone.
+    Fine,
+}
+
+/// A fine mesh with its coarse one.
+struct OnCoarse<'a> {
+    fine: &'a Whole,
+    whole: Whole,
+    coarse: Arc<Coarse>,
+    settings: &'a Settings,
+    /// For the coarse mesh.
+    strict: Settings,
+}
+
+impl<'a> OnCoarse<'a> {
+    fn new(fine: &'a Whole, settings: &'a Settings, progress: &Run<'_>) -> Result<Self, Cancelled> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
-        let wanted = (COARSE_SHARE * self.patch.mesh.vertex_count() as f64) as usize;
+        let wanted = (COARSE_SHARE * fine.patch.mesh.vertex_count() as f64) as usize;
         let target = wanted.clamp(COARSE_VERTICES.0, COARSE_VERTICES.1);
-        let coarse = mesh::coarsen(&self.patch.mesh, target, progress)?;
+        let input = |f: &mut Fingerprint| {
+            f.mesh(&fine.patch.mesh);
+            f.indices([target]);
+        };
+        let bytes = |c: &Coarse| 4 * (c.face.len() + c.vertex.len()) + memo::bytes_of(&c.mesh);
+        let coarse =
+            progress.recall(Kind::Coarse, input, bytes, || mesh::coarsen(&fine.patch.mesh, target, progress))?;
         let polygon = (0..coarse.mesh.face_count()).map(|f| FaceId::new(f).index() as u32).collect();
-        let whole = Whole::new(coarse.mesh, polygon);
+        let whole = Whole::new(coarse.mesh.clone(), polygon);
         let mut strict = settings.clone();
         strict.stretch_limit = 1.0 + COARSE_ALLOWANCE * (settings.stretch_limit - 1.0);
-        let charts = whole.charts(vec![whole.patch.clone()], Which::All, &strict, rungs, &|_| (), progress)?;
-        let mut coarse_label = vec![0; whole.patch.mesh.face_count()];
-        for (number, chart) in charts.iter().enumerate() {
-            for f in &chart.patch.faces {
-                coarse_label[f.index()] = FaceId::new(number).index() as u32;
+        Ok(Self { fine, whole, coarse, settings, strict })
+    }
+
+    /// Parts that flatten under the limit on the coarse mesh.
+    fn parts(&self, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Vec<Part>, Cancelled> {
+        let charts = self.whole.charts(&self.strict, rungs, &|_| (), progress)?;
+        let parts = self.prolong_labels(&self.fine.patch, &charts, progress)?;
+        let sewn = self.whole.sew(charts, &self.strict, rungs, progress)?;
+        Ok(self.join(parts, sewn))
+    }
+
+    /// Puts parts together whose guides have been sewn, cut where these are not.
+    fn join(&self, parts: Vec<Part>, sewn: Vec<Sewn>) -> Vec<Part> {
+        let mut rest: Vec<Option<Part>> = parts.into_iter().map(Some).collect();
+        let mut joined = Vec::new();
+        for sewn in sewn.into_iter().filter(|s| s.pieces.len() > 1) {
+            let mine = |p: &Option<Part>| p.as_ref().is_some_and(|p| sewn.pieces.contains(&p.number));
+            // A guide that has come to lie under two parts says of neither where to sew it.
+            if rest.iter().filter(|p| mine(p)).count() != sewn.pieces.len() {
+                continue;
+            }
+            let pieces: Vec<Part> = rest.iter_mut().filter(|p| mine(p)).filter_map(Option::take).collect();
+            let (coarse, fine) = (&self.coarse.mesh, &self.fine.patch);
+            let patches: Vec<(&Patch, &Chart)> = pieces.iter().map(|p| (&p.patch, &p.guide)).collect();
+            match darts::carried_over(coarse, &fine.mesh, &fine.polygon, &patches, &sewn) {
+                Some(patch) => joined.push(Part { patch, guide: sewn.chart, number: usize::MAX, pieces, family: None }),
+                None => joined.extend(pieces),
             }
         }
-        let label: Vec<u32> = coarse.face.iter().map(|f| coarse_label[f.index()]).collect();
-        let (mesh, polygon) = (&self.patch.mesh, &self.patch.polygon);
-        let parts = segmentation::straighten(mesh, polygon, &label, BAND_RINGS, progress)?;
-        Ok(self.patch.split(&parts.label, parts.parts))
+        joined.extend(rest.into_iter().flatten());
+        joined
     }
+
+    /// Divides a patch of the fine mesh as the coarse charts it lies on are divided.
+    fn prolong_labels(&self, patch: &Patch, charts: &[Chart], progress: &Run<'_>) -> Result<Vec<Part>, Cancelled> {
+        const NONE: u32 = u32::MAX;
+        let mut chart_of = vec![NONE; self.coarse.mesh.face_count()];
+        for (number, chart) in charts.iter().enumerate() {
+            for f in &chart.patch.faces {
+                chart_of[f.index()] = FaceId::new(number).index() as u32;
+            }
+        }
+        let under = |f: &FaceId| chart_of[self.coarse.face[f.index()].index()];
+        let mut label: Vec<u32> = patch.faces.iter().map(under).collect();
+        spread_labels(&patch.mesh, &mut label);
+        let crease_weight = self.settings.segmentation.crease_weight;
+        let input = |f: &mut Fingerprint| {
+            f.mesh(&patch.mesh);
+            f.numbers(&patch.polygon);
+            f.numbers(&label);
+            f.reals([crease_weight]);
+        };
+        let parts = progress.recall(
+            Kind::Borders,
+            input,
+            |s: &Segmentation| 4 * s.label.len(),
+            || segmentation::straighten(&patch.mesh, &patch.polygon, &label, BAND_RINGS, crease_weight, progress),
+        )?;
+        let guide_of = |part: &Patch| {
+            let mut votes = vec![0usize; charts.len()];
+            part.faces.iter().map(under).filter(|n| *n != NONE).for_each(|n| votes[n as usize] += 1);
+            let best = votes.iter().enumerate().max_by_key(|&(i, n)| (*n, Reverse(i)));
+            best.map_or(0, |b| b.0)
+        };
+        let part = |patch: Patch| {
+            let number = guide_of(&patch);
+            Part { guide: charts[number].clone(), number, patch, pieces: Vec::new(), family: None }
+        };
+        Ok(patch.split(&parts.label, parts.parts).into_iter().map(part).collect())
+    }
+
+    /// Flattens the parts from where the coarse charts are. Those over the limit are split on the coarse mesh, those
+    /// too small for that are charted on the fine one. Each split strictly reduces the coarse faces of a part.
+    fn polish(
+        &self,
+        parts: Vec<Part>,
+        done: &(dyn Fn(f64) + Sync),
+        rungs: &mut Rungs,
+        progress: &Run<'_>,
+    ) -> Result<Charting, Cancelled> {
+        let mut open = parts;
+        let mut rest = Vec::new();
+        let mut accepted: Vec<(Chart, Option<u32>)> = Vec::new();
+        let mut split_count = 0;
+        while !open.is_empty() {
+            open.sort_by_key(|p| (Reverse(p.patch.faces.len()), p.patch.faces[0]));
+            let outcomes: Vec<Result<(Outcome, Rungs), Cancelled>> = open
+                .par_iter()
+                .with_max_len(1)
+                .map(|part| {
+                    let mut rungs = Rungs::default();
+                    let outcome = self.step(part, &mut rungs, progress)?;
+                    if matches!(outcome, Outcome::Accept(_)) {
+                        done(part.patch.faces.len() as f64);
+                    }
+                    Ok((outcome, rungs))
+                })
+                .collect();
+            let mut next = Vec::new();
+            for (part, outcome) in open.into_iter().zip(outcomes) {
+                let (outcome, steps) = outcome?;
+                rungs.add(&steps);
+                match outcome {
+                    Outcome::Accept(chart) => accepted.push((*chart, part.family)),
+                    Outcome::Fine => rest.push(part.patch),
+                    Outcome::Split(mut parts) => {
+                        let halves = parts.len() == 2;
+                        for part in &mut parts {
+                            part.family = Some(split_count);
+                            split_count += u32::from(!halves);
+                        }
+                        split_count += 1;
+                        next.extend(parts);
+                    }
+                }
+            }
+            open = next;
+        }
+        let charting = charting::chart(rest, self.settings, done, progress)?;
+        // What is charted anew has not been tried with its neighbours on the coarse mesh either.
+        let alone = split_count + charting.family.iter().flatten().max().map_or(0, |most| most + 1);
+        let family = (alone..).zip(charting.family).map(|(own, f)| Some(f.map_or(own, |f| f + split_count)));
+        accepted.extend(charting.charts.into_iter().zip(family));
+        accepted.sort_by_key(|(c, _)| c.patch.faces[0]);
+        let (charts, family) = accepted.into_iter().unzip();
+        Ok(Charting { charts, family, rungs: charting.rungs })
+    }
+
+    fn step(&self, part: &Part, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Outcome, Cancelled> {
+        progress.check()?;
+        let done = |h: HalfedgeId| part.is_border(&self.coarse.mesh, h);
+        if let Some(Prolonged { patch, start }) = prolong(&self.coarse, &part.guide, &part.patch, done)
+            && let Some(flat) = flatten::polish(&patch, &start, Rung::Prolonged, self.settings, rungs, progress)?
+        {
+            return Ok(Outcome::Accept(Box::new(flat.into_chart(patch))));
+        }
+        if !part.pieces.is_empty() {
+            return Ok(Outcome::Split(part.pieces.clone()));
+        }
+        let mut faces = part.guide.patch.faces.clone();
+        if faces.len() <= LEAST_COARSE_FACES || part.patch.faces.len() <= LEAST_FINE_FACES {
+            return Ok(Outcome::Fine);
+        }
+        faces.sort_unstable();
+        let (mesh, polygon) = (&self.whole.patch.mesh, &self.whole.patch.polygon);
+        let patch = Patch::of_surface(mesh, polygon, faces);
+        let patches = charting::split(&patch, &self.strict, rungs, progress)?;
+        let charting = charting::chart(patches, &self.strict, &|_| (), progress)?;
+        rungs.add(&charting.rungs);
+        let parts = self.prolong_labels(&part.patch, &charting.charts, progress)?;
+        // Straightening may have given one label all.
+        Ok(if parts.len() < 2 { Outcome::Fine } else { Outcome::Split(parts) })
+    }
+}
+
+/// Gives faces without a label that of a neighbour, a ring at a time; 0 if nobody has any.
+fn spread_labels(mesh: &mesh::TriMesh, label: &mut [u32]) {
+    let mut front: Vec<FaceId> = mesh.faces().filter(|f| label[f.index()] != u32::MAX).collect();
+    while !front.is_empty() {
+        let mut next = Vec::new();
+        for f in front {
+            for h in f.halfedges() {
+                let t = mesh.twin(h);
+                if !t.is_none() && label[t.face().index()] == u32::MAX {
+                    label[t.face().index()] = label[f.index()];
+                    next.push(t.face());
+                }
+            }
+        }
+        front = next;
+    }
+    label.iter_mut().filter(|l| **l == u32::MAX).for_each(|l| *l = 0);
 }

@@ -10,13 +10,14 @@ use crate::error::UnwrapError;
 use crate::mesh::{self, FaceId, MeshInput, Surface, measure};
 use crate::metrics::{self, Texture, UvMesh, UvMeshError};
 use crate::packing::{self, PackItem, Packed};
-use crate::progress::{Cancelled, Progress, Stage};
+use crate::progress::{Cancelled, Stage};
 use crate::report::Report;
 use crate::rounding::{self, Rounding};
 use crate::segmentation;
-use crate::settings::{ChartScale, Settings};
+use crate::settings::{ChartScale, LimitOver, Settings};
 use crate::verify::{self, Certificate};
 
+use super::memo::Run;
 use super::rungs::{Rung, Rungs};
 use super::{Atlas, Clock, charting, flatten};
 
@@ -45,7 +46,7 @@ pub(super) fn finish(
     mut rungs: Rungs,
     settings: &Settings,
     mut clock: Clock,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Atlas, UnwrapError> {
     let arrays = Arrays::new(input, surface, settings.weld);
     let mut round = 0;
@@ -64,7 +65,7 @@ pub(super) fn finish(
         if (faulty.is_empty() && layout.broken.is_empty()) || round == MOST_ROUNDS {
             let measures = metrics::measure(&mesh, progress)?;
             clock.lap("verify");
-            let mut report = Report::new(&measures, settings.stretch_limit);
+            let mut report = Report::new(&measures, settings.chart_limit());
             report.faces = input.face_offsets.len().saturating_sub(1);
             report.unmapped_faces = surface.unmapped.len();
             report.warnings = warnings(surface, &layout, &certificate);
@@ -73,6 +74,13 @@ pub(super) fn finish(
                     "{} charts exceed the stretch limit, the worst is chart {chart} with {l2:.3}",
                     report.charts_over_limit.len()
                 ));
+            }
+            if settings.limit_over == LimitOver::Atlas {
+                report.atlas_limit = Some(settings.stretch_limit);
+                if report.l2_chart_scale > settings.stretch_limit {
+                    let (l2, limit) = (report.l2_chart_scale, settings.stretch_limit);
+                    report.warnings.push(format!("the atlas has a stretch of {l2:.3}, above the limit of {limit}"));
+                }
             }
             report.rungs = rungs.taken();
             report.seconds = clock.laps;
@@ -175,7 +183,7 @@ impl Layout {
         surface: &Surface,
         charts: &[Chart],
         settings: &Settings,
-        progress: &Progress,
+        progress: &Run<'_>,
     ) -> Result<Self, UnwrapError> {
         let packed = pack(charts, settings, progress)?;
         let size = packed.size.map(f64::from);
@@ -215,7 +223,7 @@ impl Layout {
     }
 }
 
-fn pack(charts: &[Chart], settings: &Settings, progress: &Progress) -> Result<Packed, UnwrapError> {
+fn pack(charts: &[Chart], settings: &Settings, progress: &Run<'_>) -> Result<Packed, UnwrapError> {
     let index = |v: mesh::VertexId| u32::try_from(v.index()).unwrap_or(u32::MAX);
     let triangles: Vec<Vec<[u32; 3]>> =
         charts.iter().map(|c| c.patch.mesh.triangles().iter().map(|t| t.map(index)).collect()).collect();
@@ -253,7 +261,7 @@ fn mend(
     faults: &Faults<'_>,
     rungs: &mut Rungs,
     settings: &Settings,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Vec<Chart>, Cancelled> {
     let mut separate: Vec<(usize, u32)> =
         faults.broken.iter().map(|&(chart, face)| (chart, surface.polygon[face.index()])).collect();

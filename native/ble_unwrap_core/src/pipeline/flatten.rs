@@ -9,10 +9,11 @@ use crate::distortion::{self, RestTriangle};
 use crate::embedding::{self, EmbeddingError, Model};
 use crate::geodesics::LandmarkDistances;
 use crate::mesh::FaceId;
-use crate::progress::{Cancelled, Progress};
+use crate::progress::Cancelled;
 use crate::settings::Settings;
-use crate::stretch::{self, Minimised, StretchError};
+use crate::stretch::{self, BOUNDARY_REACH, Minimised, StretchError};
 
+use super::memo::{Fingerprint, Kind, Run};
 use super::rungs::{Rung, Rungs};
 use super::steps::Steps;
 
@@ -32,6 +33,16 @@ const MOST_FOLDED: f64 = 0.25;
 /// A start without flips that is stretched more than this is not worth minimising: of the trials on a model
 /// with many holes, where starts are worst, none that began above 3 came under an L2 of 1.1; this leaves room.
 const HOPELESS_START: f64 = 4.0;
+
+/// A patch whose faces all lean less than 70° from their mean normal is flattened from its projection.
+const MOST_LEANING: f64 = 70.0;
+
+/// A position in the plane for each vertex.
+type Start = Vec<Point2<f64>>;
+
+fn bytes_of_start(start: &Option<Start>) -> usize {
+    16 * start.as_ref().map_or(0, Vec::len)
+}
 
 /// A patch flattened without flips and without overlap.
 pub(super) struct Flat {
@@ -78,10 +89,51 @@ pub(super) fn flatten(
     distances: &LandmarkDistances,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Option<Flat>, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
     recover(trial.flatten(distances, Some(settings.stretch_limit), rungs))
+}
+
+/// Flattens a patch of genus 0 with a boundary from its projection, if it leans so little from its mean plane that this
+/// has no flip and no overlap. The outer `None` if it does not, the inner one where the limit is out of reach: another
+/// start would not help. Costs neither distances nor an embedding.
+pub(super) fn projected(
+    patch: &Patch,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Run<'_>,
+) -> Result<Option<Option<Flat>>, Cancelled> {
+    let Some(start) = embedding::project(&patch.mesh, MOST_LEANING) else { return Ok(None) };
+    if stretch::first_flip(&patch.mesh, &start).is_some() || !stretch::boundary_is_simple(&patch.mesh, &start) {
+        return Ok(None);
+    }
+    match Trial::new(patch, settings, progress).free(&start, Some(settings.stretch_limit)) {
+        Ok(Free::Simple(flat)) => {
+            rungs.take(Rung::Projection);
+            Ok(Some(Some(flat)))
+        }
+        Ok(Free::Refused) => Ok(Some(None)),
+        Err(StretchError::Cancelled(c)) => Err(c),
+        Ok(Free::Overlaps) | Err(_) => Ok(None),
+    }
+}
+
+/// Flattens a patch of genus 0 with a boundary from a start in the plane near its minimum, whose boundary is all but
+/// simple; `rung` is where the start comes from. `None` where the limit is out of reach or the boundary runs over itself.
+pub(super) fn polish(
+    patch: &Patch,
+    start: &[Point2<f64>],
+    rung: Rung,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Run<'_>,
+) -> Result<Option<Flat>, Cancelled> {
+    if let Some(flat) = isometric(patch, rungs) {
+        return Ok(Some(flat));
+    }
+    let trial = Trial::new(patch, settings, progress);
+    recover(trial.polish(start, settings.stretch_limit, rung, rungs))
 }
 
 /// Flattens a patch that is one polygon, which cannot be split: as well as it goes, and at worst on a
@@ -91,7 +143,7 @@ pub(super) fn flatten_polygon(
     distances: &LandmarkDistances,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Flat, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
     if let Some(flat) = recover(trial.flatten(distances, None, rungs))? {
@@ -107,7 +159,7 @@ pub(super) fn flatten_apart(
     patch: &Patch,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<Option<Flat>, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
     recover(trial.flatten_apart(Some(settings.stretch_limit), rungs))
@@ -144,17 +196,28 @@ fn on_a_circle(patch: &Patch) -> Flat {
     Flat { l2: l2(patch, &RestTriangle::of_mesh(&patch.mesh), &uv), uv }
 }
 
+/// What became of a chart whose boundary was free.
+enum Free {
+    Simple(Flat),
+    /// Under the limit, but its boundary runs over itself.
+    Overlaps,
+    Refused,
+}
+
 /// The steps on one patch under a limit: the work stops as soon as that is out of reach.
 struct Trial<'a> {
     patch: &'a Patch,
+    settings: &'a Settings,
+    seed: u64,
     steps: Steps<'a>,
+    run: &'a Run<'a>,
 }
 
 impl<'a> Trial<'a> {
-    fn new(patch: &'a Patch, settings: &'a Settings, progress: &'a Progress) -> Self {
+    fn new(patch: &'a Patch, settings: &'a Settings, progress: &'a Run<'a>) -> Self {
         // The same for a patch whatever else the surface holds.
         let seed = settings.seed ^ patch.faces.first().map_or(0, |f| f.index() as u64);
-        Self { patch, steps: Steps::new(&patch.mesh, settings, seed, progress) }
+        Self { patch, settings, seed, steps: Steps::new(&patch.mesh, settings, seed, progress), run: progress }
     }
 
     fn flatten(
@@ -168,38 +231,111 @@ impl<'a> Trial<'a> {
             if told_by_folds && self.folded_share(&start) > MOST_FOLDED {
                 return Ok(None);
             }
-            let (uv, rung) = self.steps.remove_flips(&start)?;
+            let cleared = match limit {
+                // Of 29 trials on a body that Tutte's embedding had to save one came under the limit.
+                Some(_) => self.recall_start(Kind::Cleared, &start, || self.steps.clear_flips(&start))?,
+                None => Some(self.steps.remove_flips(&start)?),
+            };
+            let Some((uv, rung)) = cleared else { return Ok(None) };
             rungs.take(rung);
             if limit.is_some() && stretch::l2_stretch(self.steps.mesh, &self.steps.rest, &uv) > HOPELESS_START {
                 return Ok(None);
             }
-            let Some(best) = self.minimise(&uv, limit, false)? else { return Ok(None) };
-            if self.steps.boundary_is_simple(&best.uv) {
-                return Ok(self.judge(best.uv, limit));
-            }
-            if limit.is_some_and(|limit| best.l2 > limit) {
-                return Ok(None);
+            match self.free(&uv, limit)? {
+                Free::Simple(flat) => return Ok(Some(flat)),
+                Free::Refused => return Ok(None),
+                Free::Overlaps if self.steps.boundary_is_simple(&uv) => return self.apart(&uv, limit),
+                Free::Overlaps => {}
             }
         }
-        // The free boundary ran over itself: start without overlap and keep it so.
         self.flatten_apart(limit, rungs)
+    }
+
+    fn polish(
+        &self,
+        start: &[Point2<f64>],
+        limit: f64,
+        rung: Rung,
+        rungs: &mut Rungs,
+    ) -> Result<Option<Flat>, StretchError> {
+        if self.folded_share(start) > MOST_FOLDED {
+            return Ok(None);
+        }
+        let cleared = self.recall_start(Kind::LocallyCleared, start, || self.steps.clear_locally(start))?;
+        let Some(mut uv) = cleared else { return Ok(None) };
+        rungs.take(if uv == start { rung } else { Rung::FoldoverFree });
+        if !self.steps.boundary_is_simple(&uv) {
+            let parted = self.recall_start(Kind::Parted, &uv, || self.steps.part_boundary(&uv))?;
+            let Some(parted) = parted else { return Ok(None) };
+            uv = parted;
+        }
+        if !self.steps.boundary_is_tight(&uv) {
+            match self.free(&uv, Some(limit))? {
+                Free::Simple(flat) => return Ok(Some(flat)),
+                Free::Refused => return Ok(None),
+                Free::Overlaps => {}
+            }
+        }
+        self.apart(&uv, Some(limit))
+    }
+
+    /// Minimises from a start without flips, its boundary free.
+    fn free(&self, start: &[Point2<f64>], limit: Option<f64>) -> Result<Free, StretchError> {
+        let Some(best) = self.minimise(start, limit, None)? else { return Ok(Free::Refused) };
+        if self.steps.boundary_is_simple(&best.uv) {
+            return Ok(self.judge(best.uv, limit).map_or(Free::Refused, Free::Simple));
+        }
+        Ok(if limit.is_some_and(|limit| best.l2 > limit) { Free::Refused } else { Free::Overlaps })
+    }
+
+    /// Minimises from a start whose boundary is simple, and keeps it so.
+    fn apart(&self, start: &[Point2<f64>], limit: Option<f64>) -> Result<Option<Flat>, StretchError> {
+        let Some(best) = self.minimise(start, limit, Some(BOUNDARY_REACH))? else { return Ok(None) };
+        Ok(if self.steps.boundary_is_simple(&best.uv) { self.judge(best.uv, limit) } else { None })
     }
 
     fn flatten_apart(&self, limit: Option<f64>, rungs: &mut Rungs) -> Result<Option<Flat>, StretchError> {
         let Some(circle) = self.steps.on_circle()? else { return Ok(None) };
         rungs.take(Rung::TutteCircle);
-        let Some(best) = self.minimise(&circle, limit, true)? else { return Ok(None) };
-        Ok(if self.steps.boundary_is_simple(&best.uv) { self.judge(best.uv, limit) } else { None })
+        self.apart(&circle, limit)
     }
 
     /// `None` where the distances do not span a plane; Tutte needs none.
-    fn embed(&self, distances: &LandmarkDistances) -> Result<Option<Vec<Point2<f64>>>, Cancelled> {
-        let all = self.steps.distances_of_all()?;
-        match self.steps.embed(all.as_ref().unwrap_or(distances)) {
-            Ok(embedded) => Ok(Some(embedded.uv)),
-            Err(EmbeddingError::Cancelled(c)) => Err(c),
-            Err(_) => Ok(None),
-        }
+    fn embed(&self, distances: &LandmarkDistances) -> Result<Option<Start>, Cancelled> {
+        let input = |f: &mut Fingerprint| {
+            f.mesh(self.steps.mesh);
+            f.distances(distances);
+            f.settings(&(&self.settings.embedding, &self.settings.geodesics, self.settings.together_max, self.seed));
+        };
+        let embedded = self.run.recall(Kind::Embedding, input, bytes_of_start, || {
+            let all = self.steps.distances_of_all()?;
+            match self.steps.embed(all.as_ref().unwrap_or(distances)) {
+                Ok(embedded) => Ok(Some(embedded.uv)),
+                Err(EmbeddingError::Cancelled(c)) => Err(c),
+                Err(_) => Ok(None),
+            }
+        })?;
+        Ok((*embedded).clone())
+    }
+
+    /// What a step that removes flips or overlap makes of a start; refused ones and those that a solver fails on are kept,
+    /// too.
+    fn recall_start<T: Clone + Send + Sync + 'static>(
+        &self,
+        kind: Kind,
+        start: &[Point2<f64>],
+        step: impl FnOnce() -> Result<Option<T>, StretchError>,
+    ) -> Result<Option<T>, StretchError> {
+        let input = |f: &mut Fingerprint| {
+            f.mesh(self.steps.mesh);
+            f.points(start);
+        };
+        let bytes = |_: &Result<Option<T>, StretchError>| 16 * start.len();
+        let known = self.run.recall(kind, input, bytes, || match step() {
+            Err(StretchError::Cancelled(c)) => Err(StretchError::Cancelled(c)),
+            other => Ok(other),
+        })?;
+        (*known).clone()
     }
 
     /// Share of the surface that a map turns over.
@@ -215,10 +351,27 @@ impl<'a> Trial<'a> {
         &self,
         start: &[Point2<f64>],
         abandon_above: Option<f64>,
-        keep_boundary_simple: bool,
+        keep_apart: Option<f64>,
     ) -> Result<Option<Minimised>, StretchError> {
-        let best = self.steps.minimise(start, abandon_above, keep_boundary_simple)?;
-        Ok((!best.abandoned).then_some(best))
+        let input = |f: &mut Fingerprint| {
+            f.mesh(self.steps.mesh);
+            f.points(start);
+            f.reals(keep_apart);
+            f.settings(&(&self.settings.stretch, self.seed));
+        };
+        let given_up = |best: &Minimised| abandon_above.is_some_and(|limit| limit < best.abandoned_below);
+        // One that was given up tells nothing about limits that it would have gone on under.
+        let will_do = |best: &Minimised| !best.abandoned || given_up(best);
+        let bytes = |best: &Minimised| 16 * best.uv.len();
+        let minimise = || {
+            let mut best = self.steps.minimise(start, abandon_above, keep_apart)?;
+            if best.abandoned {
+                best.uv = Vec::new();
+            }
+            Ok::<_, StretchError>(best)
+        };
+        let best = self.run.recall_if(Kind::Minimum, input, will_do, bytes, minimise)?;
+        Ok((!given_up(&best)).then(|| (*best).clone()))
     }
 
     fn judge(&self, uv: Vec<Point2<f64>>, limit: Option<f64>) -> Option<Flat> {

@@ -5,13 +5,15 @@
 
 use rayon::prelude::*;
 
-use crate::charts::{Chart, Patch};
-use crate::mesh::{FaceId, HalfedgeId, TriMesh};
-use crate::progress::{Cancelled, Progress};
+use crate::charts::Chart;
+use crate::mesh::{HalfedgeId, TriMesh};
+use crate::progress::Cancelled;
 use crate::settings::Settings;
 
-use super::charting::{self, Charting};
+use super::charting::Charting;
+use super::memo::Run;
 use super::rungs::{Rung, Rungs};
+use super::sew;
 
 /// Failed unions a chart may take part in before it is left alone.
 const MOST_FAILURES: usize = 4;
@@ -45,7 +47,7 @@ impl Candidate {
     }
 }
 
-/// Joins neighbouring charts, longest shared border over √(smaller area) first, as long as the union
+/// Joins neighbouring charts, longest shared border over √(smaller area) first (guides count little), as long as the union
 /// is under the limit. Each chart takes part in at most [`MOST_FAILURES`] failed tests, so the number of
 /// tests is linear in the number of charts. Two halves of a split in two are not tried: their union has
 /// already been refused.
@@ -55,7 +57,7 @@ pub(super) fn merge(
     charting: Charting,
     which: Which,
     settings: &Settings,
-    progress: &Progress,
+    progress: &Run<'_>,
 ) -> Result<(Vec<Chart>, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
     let family = charting.family;
@@ -93,8 +95,9 @@ pub(super) fn merge(
             .with_max_len(1)
             .map(|&(a, b)| {
                 let mut rungs = Rungs::default();
-                let union = union(mesh, polygon, &pool, a, b);
-                Ok((charting::try_chart(&union, settings, &mut rungs, progress)?, rungs))
+                let (Some(one), Some(other)) = (&pool[a], &pool[b]) else { return Ok((None, rungs)) };
+                let sides = [&one.chart, &other.chart];
+                Ok((sew::joined(mesh, polygon, sides, settings, &mut rungs, progress)?, rungs))
             })
             .collect();
         for (&(a, b), test) in pairs.iter().zip(tests) {
@@ -124,13 +127,6 @@ pub(super) fn merge(
     Ok((charts, rungs))
 }
 
-fn union(mesh: &TriMesh, polygon: &[u32], pool: &[Option<Candidate>], a: usize, b: usize) -> Patch {
-    let faces_of = |i: usize| pool[i].iter().flat_map(|c| c.chart.patch.faces.iter().copied());
-    let mut faces: Vec<FaceId> = faces_of(a).chain(faces_of(b)).collect();
-    faces.sort_unstable();
-    Patch::of_surface(mesh, polygon, faces)
-}
-
 /// Shared border length of each pair of charts that may still be tested, sorted by pair.
 fn borders(mesh: &TriMesh, owner: &[usize], pool: &[Option<Candidate>], which: Which) -> Vec<(usize, usize, f64)> {
     let faces = |i: usize| pool[i].as_ref().map_or(0, |c| c.chart.patch.faces.len());
@@ -149,7 +145,7 @@ fn borders(mesh: &TriMesh, owner: &[usize], pool: &[Option<Candidate>], which: W
         let (a, b) = (a.min(b), a.max(b));
         let refused = || pool[a].as_ref().is_some_and(|c| c.refused.contains(&b));
         (a != b && b != usize::MAX && wanted(a, b) && open(a) && open(b) && !refused())
-            .then(|| (a, b, mesh.edge_length(h)))
+            .then(|| (a, b, mesh.edge_length(h) * mesh.border_cost(h)))
     };
     let mut sides: Vec<(usize, usize, f64)> = mesh.halfedges().filter_map(shared).collect();
     sides.sort_by_key(|s| (s.0, s.1));

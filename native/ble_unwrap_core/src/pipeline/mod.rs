@@ -1,33 +1,38 @@
 //! The whole way from a mesh to an atlas; alone knows every stage.
 //!
-//! 1. Condition the input into an oriented manifold surface ([`mesh::condition`]).
+//! 1. Condition the input into an oriented manifold surface ([`condition`](crate::mesh::condition())).
 //! 2. Cut it into charts under the stretch limit, and join charts that were cut needlessly.
 //! 3. Pack the charts and round to single precision.
 //! 4. Verify the rounded result exactly and measure it.
 
+mod analysis;
+mod budget;
 mod charting;
 mod component;
+mod darts;
 mod finish;
 mod flatten;
+mod memo;
 mod merge;
+mod prolong;
 mod rungs;
+mod sew;
 mod steps;
 mod tally;
 
 use std::time::Instant;
 
-use rayon::prelude::*;
-
-use crate::charts::{Chart, Patch};
 use crate::error::UnwrapError;
-use crate::mesh::{self, ConditionOptions, MeshInput};
-use crate::progress::{Cancelled, Progress, Stage};
+use crate::mesh::MeshInput;
+use crate::progress::{Progress, Stage};
 use crate::report::Report;
 use crate::settings::Settings;
 
+pub use analysis::Analysis;
+use analysis::Prepared;
+use memo::Run;
 pub use rungs::{Rung, Rungs};
 pub(crate) use steps::Steps;
-use tally::Tally;
 
 /// A UV for every corner of the input, and what is known about it.
 #[derive(Clone, Debug)]
@@ -45,7 +50,8 @@ pub struct Atlas {
 /// Guaranteed for every result, and checked exactly on the final single-precision values: each face
 /// whose vertices are finite lies in exactly one chart; no triangle is flipped or without area; no
 /// chart overlaps itself or another; charts keep the margin. Every chart has an L2 stretch within
-/// `settings.stretch_limit` or is listed in the report (a single polygon may not flatten under it). The
+/// `settings.stretch_limit` or is listed in the report (a single polygon may not flatten under it); where that limit is
+/// over the atlas, this holds for [`Settings::chart_limit`], and the whole is within the limit or the report warns. The
 /// result is the same, bit for bit, for any number of threads.
 ///
 /// Not guaranteed: the fewest charts or the shortest seams possible.
@@ -60,22 +66,9 @@ pub fn unwrap(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -
     settings.validate()?;
     let mut clock = Clock::new();
     progress.enter(Stage::Condition);
-    let surface = mesh::condition(input, &ConditionOptions { weld: settings.weld }, progress)?;
+    let prepared = Prepared::new(input, settings.weld, progress)?;
     clock.lap("condition");
-
-    progress.enter(Stage::Charts);
-    let patches = Patch::components(&surface.mesh, &surface.polygon);
-    let tally = Tally::new(progress, surface.mesh.face_count());
-    let made: Vec<Result<(Vec<Chart>, Rungs), Cancelled>> =
-        patches.par_iter().with_max_len(1).map(|patch| component::charts(patch, settings, &tally, progress)).collect();
-    let (mut charts, mut rungs) = (Vec::new(), Rungs::default());
-    for component in made {
-        let (more, steps) = component?;
-        charts.extend(more);
-        rungs.add(&steps);
-    }
-    clock.lap("charts");
-    finish::finish(input, &surface, charts, rungs, settings, clock, progress)
+    prepared.unwrap(input, settings, clock, &Run::new(progress, None))
 }
 
 /// Seconds of each stage, for the report; nothing is decided by them.

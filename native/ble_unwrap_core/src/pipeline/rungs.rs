@@ -7,9 +7,15 @@ pub enum Rung {
     Plane,
     /// A developable piece, unfolded isometrically.
     Unfold,
+    /// A patch that hardly leaves its mean plane, projected: no flip to clear.
+    Projection,
+    /// A chart of the coarse mesh, carried over: no flip to clear.
+    Prolonged,
+    /// Two charts joined along their border, no flip to clear.
+    Sewn,
     /// Bernoulli logistic embedding, no flip to clear.
     Embedding,
-    /// The embedding, its flips cleared by the foldover-free energy.
+    /// Any of these, its flips cleared by the foldover-free energy.
     FoldoverFree,
     /// Tutte's embedding in the convexified outline of the embedding.
     TutteShape,
@@ -32,9 +38,12 @@ pub enum Rung {
 }
 
 impl Rung {
-    const ALL: [Self; 13] = [
+    const ALL: [Self; 16] = [
         Self::Plane,
         Self::Unfold,
+        Self::Projection,
+        Self::Prolonged,
+        Self::Sewn,
         Self::Embedding,
         Self::FoldoverFree,
         Self::TutteShape,
@@ -54,6 +63,9 @@ impl Rung {
         match self {
             Self::Plane => "plane",
             Self::Unfold => "unfold",
+            Self::Projection => "projection",
+            Self::Prolonged => "prolonged",
+            Self::Sewn => "sewn",
             Self::Embedding => "embedding",
             Self::FoldoverFree => "foldover_free",
             Self::TutteShape => "tutte_shape",

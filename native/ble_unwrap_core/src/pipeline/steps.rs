@@ -13,6 +13,9 @@ use crate::stretch::{self, Injective, MinimiseOptions, Minimised, StretchError, 
 
 use super::rungs::Rung;
 
+/// A map without flips, and how it was got.
+pub(crate) type Cleared = (Vec<Point2<f64>>, Rung);
+
 /// A patch of genus 0 with a boundary, and what every step needs.
 pub(crate) struct Steps<'a> {
     pub(crate) mesh: &'a TriMesh,
@@ -54,15 +57,15 @@ impl<'a> Steps<'a> {
     }
 
     /// The same map without flips, and how it was got.
-    pub(crate) fn remove_flips(&self, start: &[Point2<f64>]) -> Result<(Vec<Point2<f64>>, Rung), StretchError> {
+    pub(crate) fn remove_flips(&self, start: &[Point2<f64>]) -> Result<Cleared, StretchError> {
         let (uv, how) = stretch::make_injective(self.mesh, &self.rest, start, self.progress)?;
-        let rung = match how {
-            Injective::AlreadyWas => Rung::Embedding,
-            Injective::FoldoverFree => Rung::FoldoverFree,
-            Injective::TutteShape => Rung::TutteShape,
-            Injective::TutteCircle => Rung::TutteCircle,
-        };
-        Ok((uv, rung))
+        Ok((uv, rung_of(how)))
+    }
+
+    /// The same, but `None` where the flips resist.
+    pub(crate) fn clear_flips(&self, start: &[Point2<f64>]) -> Result<Option<Cleared>, StretchError> {
+        let cleared = stretch::clear_flips(self.mesh, &self.rest, start, self.progress)?;
+        Ok(cleared.map(|(uv, how)| (uv, rung_of(how))))
     }
 
     /// Tutte's embedding in a circle: where the free boundary ran over itself, a start whose boundary is
@@ -76,13 +79,37 @@ impl<'a> Steps<'a> {
         &self,
         start: &[Point2<f64>],
         abandon_above: Option<f64>,
-        keep_boundary_simple: bool,
+        keep_apart: Option<f64>,
     ) -> Result<Minimised, StretchError> {
-        let options = MinimiseOptions { abandon_above, keep_boundary_simple, seed: self.seed };
+        let options = MinimiseOptions { abandon_above, keep_apart, seed: self.seed };
         stretch::minimise_stretch(self.mesh, &self.rest, start, &self.settings.stretch, &options, self.progress)
+    }
+
+    /// The same map without flips, where they are few.
+    pub(crate) fn clear_locally(&self, start: &[Point2<f64>]) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
+        stretch::clear_locally(self.mesh, &self.rest, start, self.progress)
+    }
+
+    /// The same map with a boundary that is simple, where it crosses itself only here and there.
+    pub(crate) fn part_boundary(&self, uv: &[Point2<f64>]) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
+        stretch::part_boundary(self.mesh, &self.rest, uv, self.progress)
+    }
+
+    /// Whether the boundary comes so near to itself that minimisation may take it across.
+    pub(crate) fn boundary_is_tight(&self, uv: &[Point2<f64>]) -> bool {
+        stretch::boundary_is_tight(self.mesh, &self.rest, uv)
     }
 
     pub(crate) fn boundary_is_simple(&self, uv: &[Point2<f64>]) -> bool {
         stretch::boundary_is_simple(self.mesh, uv)
+    }
+}
+
+fn rung_of(how: Injective) -> Rung {
+    match how {
+        Injective::AlreadyWas => Rung::Embedding,
+        Injective::FoldoverFree => Rung::FoldoverFree,
+        Injective::TutteShape => Rung::TutteShape,
+        Injective::TutteCircle => Rung::TutteCircle,
     }
 }

@@ -9,32 +9,43 @@ use crate::linalg::{Mds, classical_mds};
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
 
-use super::CutGraph;
 use super::bends::{Bends, capacity};
 use super::polygon_graph::PolygonGraph;
+use super::{CutCost, CutGraph};
 
-/// Moves the borders between parts. `crease_weight` is the α of the capacity
-/// α/(1 + d/mean) + (1 − α)·(gᵢ + gⱼ)/(2·mean), with d = 1 − cos(dihedral) and g the difference between
-/// the errors of a polygon's distances in the two parts' own embeddings.
+/// How borders are moved.
+#[derive(Clone, Copy)]
+pub(super) struct Cut {
+    /// See [`SegmentationSettings::band`](super::SegmentationSettings::band).
+    pub(super) band: f64,
+    /// The α of the capacity.
+    pub(super) crease_share: f64,
+    /// See [`SegmentationSettings::crease_weight`](super::SegmentationSettings::crease_weight).
+    pub(super) crease_weight: f64,
+    pub(super) cost: CutCost,
+}
+
+/// Moves the borders between parts. The capacity is made of the crease 1/(1 + d/mean)ʷ and the misfit
+/// (gᵢ + gⱼ)/(2·mean), with w the crease weight, d = 1 − cos(dihedral) and g the difference between the errors of a polygon's distances in
+/// the two parts' own embeddings.
 pub(super) fn improve(
     mesh: &TriMesh,
     graph: &PolygonGraph,
     distances: &LandmarkDistances,
     representatives: &[usize],
-    band: f64,
-    crease_weight: f64,
+    settings: Cut,
     label: &mut [u32],
     progress: &Progress,
 ) -> Result<(), Cancelled> {
-    let bends = Bends::new(mesh, graph);
+    let bends = Bends::new(mesh, graph, settings.crease_weight);
     let parts: Vec<Part> = (0..representatives.len())
-        .map(|r| Part::new(mesh, graph, distances, representatives, r, crease_weight < 1.0))
+        .map(|r| Part::new(mesh, graph, distances, representatives, r, settings.crease_share < 1.0))
         .collect();
     for a in 0..parts.len() {
         for b in a + 1..parts.len() {
             progress.check()?;
             let pair = Pair { mesh, graph, distances, bends: &bends, number: [a, b], parts: [&parts[a], &parts[b]] };
-            pair.improve(band, crease_weight, label, progress)?;
+            pair.improve(settings, label, progress)?;
         }
     }
     Ok(())
@@ -108,7 +119,8 @@ struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    fn improve(&self, band: f64, crease_weight: f64, label: &mut [u32], progress: &Progress) -> Result<(), Cancelled> {
+    fn improve(&self, settings: Cut, label: &mut [u32], progress: &Progress) -> Result<(), Cancelled> {
+        let Cut { band, crease_share, cost, .. } = settings;
         let [a, b] = self.number.map(|n| u32::try_from(n).unwrap_or(0));
         // −1 at the first representative, 0 on the bisector, 1 at the second.
         let balance = |p: usize| {
@@ -127,7 +139,7 @@ impl Pair<'_> {
         for (i, &p) in nodes.iter().enumerate() {
             node[p] = i;
         }
-        let misfit: Vec<f64> = if crease_weight < 1.0 {
+        let misfit: Vec<f64> = if crease_share < 1.0 {
             nodes.iter().map(|&p| (self.parts[0].error(self, p) - self.parts[1].error(self, p)).abs()).collect()
         } else {
             vec![0.0; nodes.len()]
@@ -139,8 +151,12 @@ impl Pair<'_> {
                 let q = link.to as usize;
                 let other = if node[q] == usize::MAX { misfit[i] } else { misfit[node[q]] };
                 let fit = (misfit[i] + other) / (2.0 * mean_misfit);
-                let cost = crease_weight * self.bends.crease(p, k) + (1.0 - crease_weight) * fit;
-                let capacity = capacity(cost * link.length / self.bends.mean_length);
+                let (crease, misfit) = (self.bends.crease(p, k), (1.0 - crease_share) * fit);
+                let relative = match cost {
+                    CutCost::Sum => crease_share * crease + misfit,
+                    CutCost::Product => crease * (crease_share + misfit),
+                };
+                let capacity = capacity(relative * link.length / self.bends.mean_length);
                 if node[q] != usize::MAX {
                     if p < q {
                         cut.add_edge(i, node[q], capacity);

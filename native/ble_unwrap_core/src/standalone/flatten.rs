@@ -12,7 +12,7 @@ use crate::mesh::{self, ConditionOptions, MeshError, MeshInput, Surface, VertexI
 use crate::pipeline::{Clock, Steps};
 use crate::progress::{Cancelled, Progress, Stage};
 use crate::settings::{MOST_TOGETHER, Settings};
-use crate::stretch::{self, StretchError};
+use crate::stretch::{self, BOUNDARY_REACH, StretchError};
 
 /// Height, where the surface has area 1, up to which a face's lengths are rounding; such a face does not count.
 const NEGLIGIBLE: f64 = 1e-8;
@@ -216,12 +216,12 @@ pub fn flatten(
     progress.advance(Stage::Charts, 0.7);
     let mut stretch_iterations = 0;
     if minimise {
-        let mut best = steps.minimise(&uv, None, false).map_err(named)?;
+        let mut best = steps.minimise(&uv, None, None).map_err(named)?;
         stretch_iterations = best.iterations;
         if !steps.boundary_is_simple(&best.uv)
             && let Some(circle) = steps.on_circle().map_err(named)?
         {
-            best = steps.minimise(&circle, None, true).map_err(named)?;
+            best = steps.minimise(&circle, None, Some(BOUNDARY_REACH)).map_err(named)?;
             stretch_iterations += best.iterations;
             rung = crate::Rung::TutteCircle;
         }

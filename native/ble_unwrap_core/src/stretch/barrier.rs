@@ -9,9 +9,9 @@ use super::system::{ChartSystem, advance};
 use crate::distortion::RestTriangle;
 use crate::mesh::{HalfedgeId, TriMesh};
 
-/// The barrier begins at this share of the boundary edges' lengths: small enough that the boundary of
+/// The barrier usually begins at this share of the boundary edges' lengths: small enough that the boundary of
 /// an undistorted chart does not feel itself round an ordinary corner.
-const REACH: f64 = 0.25;
+pub const BOUNDARY_REACH: f64 = 0.25;
 /// Cells a moving boundary may touch in the search for contacts, for each edge; a longer step is
 /// halved first.
 const SWEEP_BUDGET: usize = 64;
@@ -23,7 +23,7 @@ const CONTACT_SLACK: f64 = 1e-6;
 
 /// Σ w·max(0, δ/d − 1)² over boundary vertices and boundary edges they are no end of, d their distance.
 ///
-/// δ is a quarter of the shortest of the three edges involved, so tiny edges beside long ones are not
+/// δ is the reach (a quarter) of the shortest of the three edges involved, so tiny edges beside long ones are not
 /// pushed at; w = 4δ²/A, about the share of the surface that lies within reach.
 pub(super) struct Barrier {
     /// The boundary edges; vertex number `i` of the boundary is the start of edge `i`.
@@ -34,6 +34,13 @@ pub(super) struct Barrier {
     edge_reach: Vec<f64>,
     longest_reach: f64,
     area: f64,
+}
+
+/// Whether the boundary comes nearer to itself somewhere than [`BOUNDARY_REACH`], or touches itself. O(b log b) for b
+/// boundary edges of like length.
+#[must_use]
+pub fn boundary_is_tight(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> bool {
+    Barrier::new(mesh, rest, BOUNDARY_REACH).value(uv) > 0.0
 }
 
 /// A boundary vertex near a boundary edge.
@@ -49,7 +56,7 @@ struct Contact {
 }
 
 impl Barrier {
-    pub(super) fn new(mesh: &TriMesh, rest: &[RestTriangle]) -> Self {
+    pub(super) fn new(mesh: &TriMesh, rest: &[RestTriangle], reach: f64) -> Self {
         let edges: Vec<HalfedgeId> = mesh.halfedges().filter(|&h| mesh.is_boundary(h)).collect();
         let length = |h: HalfedgeId| {
             let c = rest[h.face().index()].corners();
@@ -58,10 +65,10 @@ impl Barrier {
         let mut vertex_reach = vec![f64::INFINITY; mesh.vertex_count()];
         for &h in &edges {
             for v in [mesh.from(h), mesh.to(h)] {
-                vertex_reach[v.index()] = vertex_reach[v.index()].min(REACH * length(h));
+                vertex_reach[v.index()] = vertex_reach[v.index()].min(reach * length(h));
             }
         }
-        let edge_reach: Vec<f64> = edges.iter().map(|&h| REACH * length(h)).collect();
+        let edge_reach: Vec<f64> = edges.iter().map(|&h| reach * length(h)).collect();
         Self {
             from: edges.iter().map(|&h| mesh.from(h).index() as u32).collect(),
             to: edges.iter().map(|&h| mesh.to(h).index() as u32).collect(),
@@ -234,7 +241,7 @@ mod tests {
     fn gradient_matches_finite_differences() {
         let (mesh, uv) = horseshoe(0.02);
         let rest = RestTriangle::of_mesh(&mesh);
-        let barrier = Barrier::new(&mesh, &rest);
+        let barrier = Barrier::new(&mesh, &rest, BOUNDARY_REACH);
         assert!(barrier.value(&uv) > 0.0);
         assert_eq!(barrier.value(&horseshoe(0.5).1), 0.0);
         let mut system = ChartSystem::new(&mesh, &rest).expect("analysis");
@@ -255,7 +262,7 @@ mod tests {
     #[test]
     fn first_contact_is_when_the_ends_meet() {
         let (mesh, uv) = horseshoe(0.3);
-        let barrier = Barrier::new(&mesh, &RestTriangle::of_mesh(&mesh));
+        let barrier = Barrier::new(&mesh, &RestTriangle::of_mesh(&mesh), BOUNDARY_REACH);
         // The end column moves straight at the fixed first column, which lies on y = 0 between x = 6
         // and 7: the first to touch is the vertex (6, 0).
         let last: Vec<usize> = mesh.vertices().map(|v| v.index()).filter(|&v| mesh.positions()[v].x > 39.5).collect();

@@ -101,7 +101,7 @@ impl FoldoverEnergy {
     /// χ, χ' and χ'', without cancellation for negative d.
     fn chi(&self, d: f64) -> [f64; 3] {
         let e2 = self.epsilon * self.epsilon;
-        let root = d.hypot(self.epsilon);
+        let root = (d * d + e2).sqrt();
         let chi = if d > 0.0 { 0.5 * (d + root) } else { 0.5 * e2 / (root - d) };
         [chi, chi / root, 0.5 * e2 / (root * root * root)]
     }
@@ -148,10 +148,13 @@ pub(super) fn face_derivatives<E: IsotropicEnergy>(
     // J = R(phi) diag(s) R(theta).
     let (e, f) = (0.5 * (j.m11 + j.m22), 0.5 * (j.m11 - j.m22));
     let (g, h) = (0.5 * (j.m21 + j.m12), 0.5 * (j.m21 - j.m12));
-    let (a1, a2) = (g.atan2(f), h.atan2(e));
-    let (theta, phi) = (0.5 * (a2 - a1), 0.5 * (a2 + a1));
+    let (q, r) = ((e * e + h * h).sqrt(), (f * f + g * g).sqrt());
+    // theta is half the angle of (e, h) less half that of (f, g), phi the sum of both.
+    let ((c2, s2), (c1, s1)) = (half_angle(e, h, q), half_angle(f, g, r));
+    let (ct, st) = (c2 * c1 + s2 * s1, s2 * c1 - c2 * s1);
+    let (cp, sp) = (c2 * c1 - s2 * s1, s2 * c1 + c2 * s1);
     let d = j.determinant();
-    let s1 = e.hypot(h) + f.hypot(g);
+    let s1 = q + r;
     let s2 = if s1 > 0.0 { d / s1 } else { 0.0 };
     let n = energy.derivatives(j.norm_squared(), d);
 
@@ -167,7 +170,6 @@ pub(super) fn face_derivatives<E: IsotropicEnergy>(
     let (same, cross) = (0.5 * (twist + flip), 0.5 * (flip - twist));
 
     // In the frame of U, corner k moves stretch 1 by g·v₁ along the first axis, and so on.
-    let ((st, ct), (sp, cp)) = (theta.sin_cos(), phi.sin_cos());
     let v = hat.g.map(|g| Vector2::new(ct * g.x - st * g.y, st * g.x + ct * g.y));
     let out = |x: f64, y: f64| Vector2::new(cp * x - sp * y, sp * x + cp * y);
     let block = |k: usize, l: usize| {
@@ -188,10 +190,28 @@ pub(super) fn face_derivatives<E: IsotropicEnergy>(
     }
 }
 
+/// Cosine and sine of half the angle of (x, y), which lies between −90° and 90°, where (x, y) has this norm; of no angle
+/// if that is 0. Four times as fast as the arc tangent.
+#[inline]
+fn half_angle(x: f64, y: f64, norm: f64) -> (f64, f64) {
+    if norm == 0.0 {
+        return (1.0, 0.0);
+    }
+    let (c, s) = (x / norm, y / norm);
+    // The root that does not cancel first.
+    if c > 0.0 {
+        let cos = (0.5 * (1.0 + c)).sqrt();
+        (cos, 0.5 * s / cos)
+    } else {
+        let sin = (0.5 * (1.0 - c)).sqrt().copysign(s);
+        (0.5 * s / sin, sin)
+    }
+}
+
 /// The nearest positive semidefinite matrix to [a b; b c].
 fn project(a: f64, b: f64, c: f64) -> [f64; 3] {
     let (mean, half) = (0.5 * (a + c), 0.5 * (a - c));
-    let radius = half.hypot(b);
+    let radius = (half * half + b * b).sqrt();
     if mean - radius >= 0.0 {
         return [a, b, c];
     }

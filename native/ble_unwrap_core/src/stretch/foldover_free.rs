@@ -9,19 +9,26 @@ use nalgebra::Point2;
 
 use super::StretchError;
 use super::energy::FoldoverEnergy;
+use super::neighbourhood::Neighbourhood;
 use super::overlap::first_flip;
 use super::system::{ChartSystem, advance};
 use crate::distortion::RestTriangle;
-use crate::mesh::TriMesh;
+use crate::mesh::{FaceId, TriMesh};
 use crate::progress::Progress;
 
 /// Newton steps at most. Starts that resemble the surface take 3 to 35; vertices scattered at random are not
 /// untangled in 120 either, and Tutte's embedding serves them sooner.
 const MAX_ITERATIONS: usize = 40;
+/// In so many steps
+const ROUND: usize = 10;
+/// the flips must fall to this share, or it is given up.
+const LEAST_CLEARED: f64 = 0.8;
 /// Armijo's constant.
 const ARMIJO: f64 = 1e-4;
 /// Halvings before a step is given up.
 const MAX_HALVINGS: usize = 30;
+/// Area ratio below which a triangle counts as collapsed.
+const COLLAPSED: f64 = 0.02;
 /// Least share of its way to zero that ε goes in an iteration (σ in the paper).
 const LEAST_PROGRESS: f64 = 0.1;
 
@@ -33,19 +40,67 @@ pub(super) fn foldover_free(
     start: &[Point2<f64>],
     progress: &Progress,
 ) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
+    clear(mesh, rest, start, &[], 0.0, progress)
+}
+
+/// Whether a triangle is flipped or so nearly collapsed that Newton's steps would end there.
+pub(super) fn is_collapsed(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>], f: FaceId) -> bool {
+    rest[f.index()].jacobian(mesh.triangle(f).map(|v| uv[v.index()])).determinant() < COLLAPSED
+}
+
+/// As [`foldover_free`], but only vertices near flipped or collapsed triangles move: all whose triangles are fewer than
+/// `rings` away from one. Costs what lies there.
+pub(super) fn foldover_free_near(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    start: &[Point2<f64>],
+    rings: usize,
+    progress: &Progress,
+) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
+    let bad: Vec<bool> = mesh.faces().map(|f| is_collapsed(mesh, rest, start, f)).collect();
+    if !bad.contains(&true) {
+        return Ok(first_flip(mesh, start).is_none().then(|| start.to_vec()));
+    }
+    let near = Neighbourhood::new(mesh, rest, &bad, rings);
+    let Some(cleared) = clear(&near.mesh, &near.rest, &near.read(start), &near.pinned, COLLAPSED, progress)? else {
+        return Ok(None);
+    };
+    let mut uv = start.to_vec();
+    near.write(&cleared, &mut uv);
+    Ok(first_flip(mesh, &uv).is_none().then_some(uv))
+}
+
+/// `pinned` says which vertices stay; none if it is empty. Done once no triangle is flipped and all determinants are at
+/// least `least`.
+fn clear(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    start: &[Point2<f64>],
+    pinned: &[bool],
+    least: f64,
+    progress: &Progress,
+) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
     let mut system = ChartSystem::new(mesh, rest)?;
     let mut uv = start.to_vec();
     let mut trial = uv.clone();
     let mut direction = vec![0.0; 2 * uv.len()];
     let mut energy = FoldoverEnergy { epsilon: 1.0 };
-    for _ in 0..MAX_ITERATIONS {
-        if first_flip(mesh, &uv).is_none() {
+    let mut before_round = usize::MAX;
+    for iteration in 0..MAX_ITERATIONS {
+        if first_flip(mesh, &uv).is_none() && system.least_determinant(&uv) >= least {
             return Ok(Some(uv));
+        }
+        if iteration % ROUND == 0 {
+            let flips = mesh.faces().filter(|&f| is_collapsed(mesh, rest, &uv, f)).count();
+            if flips as f64 > LEAST_CLEARED * before_round as f64 {
+                return Ok(None);
+            }
+            before_round = flips;
         }
         progress.check()?;
         let before = system.value(&energy, &uv);
         system.assemble(&energy, &uv);
-        let Some(slope) = system.solve(&mut direction) else { break };
+        let Some(slope) = system.solve_pinned(pinned, &mut direction) else { break };
         let mut step = 1.0;
         let mut after = before;
         for _ in 0..MAX_HALVINGS {
@@ -60,9 +115,9 @@ pub(super) fn foldover_free(
         }
         // Equation 7 of the paper.
         let sigma = (1.0 - after / before).max(LEAST_PROGRESS);
-        let least = system.least_determinant(&uv);
-        let root = least.hypot(energy.epsilon);
-        energy.epsilon *= if least >= 0.0 { 1.0 - sigma } else { 1.0 - sigma * root / (least.abs() + root) };
+        let worst = system.least_determinant(&uv);
+        let root = worst.hypot(energy.epsilon);
+        energy.epsilon *= if worst >= 0.0 { 1.0 - sigma } else { 1.0 - sigma * root / (worst.abs() + root) };
     }
     Ok(first_flip(mesh, &uv).is_none().then_some(uv))
 }

@@ -3,13 +3,23 @@
 use nalgebra::Point2;
 
 use super::StretchError;
-use super::foldover_free::foldover_free;
+use super::foldover_free::{foldover_free, foldover_free_near, is_collapsed};
 use super::measure::{plane_area, rescale_to_equal_area};
+use super::neighbourhood::Neighbourhood;
 use super::overlap::first_flip;
 use super::tutte::{TutteBoundary, tutte_attempt};
 use crate::distortion::RestTriangle;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
+
+/// Up to this share of flipped triangles, and always if they are no more than
+const FEW_FLIPS: f64 = 0.02;
+/// so many, they are cleared in their neighbourhoods of so many rings,
+const ALWAYS_FEW: usize = 8;
+/// the second only where the first was too narrow.
+const NEIGHBOURHOODS: [usize; 2] = [3, 8];
+/// Each is smoothed first, by so many sweeps: a fold that hangs together is spread over it.
+const SWEEPS: usize = 30;
 
 /// How a map came to have no flips; each rung of the ladder is tried only if those before it failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -23,6 +33,9 @@ pub enum Injective {
     /// Tutte's embedding in a circle.
     TutteCircle,
 }
+
+/// A point a vertex, without flips, and how they were got.
+pub type InjectiveMap = (Vec<Point2<f64>>, Injective);
 
 /// A map near `start` (a point a vertex, in about surface units) with all triangles strictly positive by an exact test, and how
 /// it was got.
@@ -41,31 +54,16 @@ pub fn make_injective(
     rest: &[RestTriangle],
     start: &[Point2<f64>],
     progress: &Progress,
-) -> Result<(Vec<Point2<f64>>, Injective), StretchError> {
+) -> Result<InjectiveMap, StretchError> {
     assert_eq!(
         (rest.len(), start.len()),
         (mesh.face_count(), mesh.vertex_count()),
         "a rest triangle a face, a point a vertex"
     );
-    progress.check()?;
-    if first_flip(mesh, start).is_none() {
-        return Ok((start.to_vec(), Injective::AlreadyWas));
+    if let Some(found) = clear_flips(mesh, rest, start, progress)? {
+        return Ok(found);
     }
-    let finite = start.iter().all(|p| p.x.is_finite() && p.y.is_finite());
-    let mut start = start.to_vec();
-    if finite {
-        if plane_area(mesh, &start) < 0.0 {
-            start.iter_mut().for_each(|p| p.x = -p.x);
-            if first_flip(mesh, &start).is_none() {
-                return Ok((start, Injective::AlreadyWas));
-            }
-        }
-        if let Some(uv) = foldover_free(mesh, rest, &start, progress)? {
-            return Ok((uv, Injective::FoldoverFree));
-        }
-    }
-    let rungs =
-        [(TutteBoundary::Shape(&start), Injective::TutteShape), (TutteBoundary::Circle, Injective::TutteCircle)];
+    let rungs = [(TutteBoundary::Shape(start), Injective::TutteShape), (TutteBoundary::Circle, Injective::TutteCircle)];
     for (boundary, rung) in rungs {
         let Some(mut uv) = tutte_attempt(mesh, rest, boundary, progress)? else { continue };
         if first_flip(mesh, &uv).is_none() {
@@ -80,6 +78,68 @@ pub fn make_injective(
         }
     }
     Err(StretchError::NotInjective)
+}
+
+/// The first rungs of [`make_injective`]: the start if it has no flips, or with its flips cleared; `None` if they resist, as
+/// they do where the start is far from any flat map.
+///
+/// # Errors
+/// [`StretchError::Solver`], [`StretchError::Cancelled`].
+pub fn clear_flips(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    start: &[Point2<f64>],
+    progress: &Progress,
+) -> Result<Option<InjectiveMap>, StretchError> {
+    progress.check()?;
+    if first_flip(mesh, start).is_none() {
+        let better = clear_locally(mesh, rest, start, progress)?;
+        return Ok(Some((better.unwrap_or_else(|| start.to_vec()), Injective::AlreadyWas)));
+    }
+    if !start.iter().all(|p| p.x.is_finite() && p.y.is_finite()) {
+        return Ok(None);
+    }
+    let mut start = start.to_vec();
+    if plane_area(mesh, &start) < 0.0 {
+        start.iter_mut().for_each(|p| p.x = -p.x);
+        if first_flip(mesh, &start).is_none() {
+            return Ok(Some((start, Injective::AlreadyWas)));
+        }
+    }
+    let cleared = match clear_locally(mesh, rest, &start, progress)? {
+        Some(uv) => Some(uv),
+        None => foldover_free(mesh, rest, &start, progress)?,
+    };
+    Ok(cleared.map(|uv| (uv, Injective::FoldoverFree)))
+}
+
+/// The map with its flipped or collapsed triangles cleared, each in its neighbourhood, and as it is if it has none; `None`
+/// if they are more than a few, or resist. Costs little where they are few.
+///
+/// # Errors
+/// [`StretchError::Solver`], [`StretchError::Cancelled`].
+pub fn clear_locally(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    start: &[Point2<f64>],
+    progress: &Progress,
+) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
+    let count = mesh.faces().filter(|&f| is_collapsed(mesh, rest, start, f)).count();
+    if count == 0 {
+        return Ok(first_flip(mesh, start).is_none().then(|| start.to_vec()));
+    }
+    if count > ALWAYS_FEW && count as f64 > FEW_FLIPS * mesh.face_count() as f64 {
+        return Ok(None);
+    }
+    let bad: Vec<bool> = mesh.faces().map(|f| is_collapsed(mesh, rest, start, f)).collect();
+    for rings in NEIGHBOURHOODS {
+        let mut smooth = start.to_vec();
+        Neighbourhood::new(mesh, rest, &bad, rings).relax(&mut smooth, SWEEPS, false);
+        if let Some(uv) = foldover_free_near(mesh, rest, &smooth, rings, progress)? {
+            return Ok(Some(uv));
+        }
+    }
+    Ok(None)
 }
 
 #[cfg(test)]

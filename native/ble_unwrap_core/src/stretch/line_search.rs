@@ -42,10 +42,17 @@ pub(super) fn minimise(
     let area = surface_area(rest);
     let mut uv = start.to_vec();
     let mut sums = total(mesh, rest, &uv);
-    let mut result = Minimised { uv: Vec::new(), l2: 0.0, iterations: 0, abandoned: false, converged: false };
+    let mut result = Minimised {
+        uv: Vec::new(),
+        l2: 0.0,
+        iterations: 0,
+        abandoned: false,
+        abandoned_below: f64::NEG_INFINITY,
+        converged: false,
+    };
     for sweep in 0..settings.max_iterations {
         let before = (sums.energy * sums.area).sqrt();
-        let saved = options.keep_boundary_simple.then(|| uv.clone());
+        let saved = options.keep_apart.map(|_| uv.clone());
         run_sweep(mesh, rest, &mut uv, sums, (options.seed, sweep as u64), true, progress)?;
         if let Some(saved) = saved
             && !boundary_is_simple(mesh, &uv)
@@ -63,9 +70,12 @@ pub(super) fn minimise(
         }
         // Sweeps gain ever less: as for Newton, but over as many sweeps as are left.
         let left = (settings.max_iterations - sweep - 1) as f64;
-        if options.abandon_above.is_some_and(|limit| sweep >= 1 && (after - left * (before - after)) / area > limit) {
-            result.abandoned = true;
-            break;
+        if sweep >= 1 {
+            result.abandoned_below = result.abandoned_below.max((after - left * (before - after)) / area);
+            if options.abandon_above.is_some_and(|limit| limit < result.abandoned_below) {
+                result.abandoned = true;
+                break;
+            }
         }
     }
     result.l2 = (sums.energy * sums.area).sqrt() / area;
@@ -209,7 +219,7 @@ mod tests {
     use super::*;
     use crate::stretch::overlap::first_flip;
     use crate::stretch::test_meshes::hemisphere;
-    use crate::stretch::{TutteBoundary, l2_stretch, minimise_stretch, tutte_embedding};
+    use crate::stretch::{BOUNDARY_REACH, TutteBoundary, l2_stretch, minimise_stretch, tutte_embedding};
 
     #[test]
     fn every_sweep_lowers_the_stretch_and_flips_nothing() {
@@ -221,7 +231,8 @@ mod tests {
         for sweeps in [1, 2, 5, 20] {
             let settings = StretchSettings { max_iterations: sweeps, tolerance: 0.0, ..StretchSettings::paper() };
             for keep in [false, true] {
-                let options = MinimiseOptions { keep_boundary_simple: keep, seed: 7, ..Default::default() };
+                let options =
+                    MinimiseOptions { keep_apart: keep.then_some(BOUNDARY_REACH), seed: 7, ..Default::default() };
                 let got = minimise_stretch(&mesh, &rest, &start, &settings, &options, &progress).expect("runs");
                 assert_eq!(first_flip(&mesh, &got.uv), None);
                 assert!((got.l2 - l2_stretch(&mesh, &rest, &got.uv)).abs() < 1e-9);

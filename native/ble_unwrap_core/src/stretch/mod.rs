@@ -23,8 +23,10 @@ mod grid;
 mod injective;
 mod line_search;
 mod measure;
+mod neighbourhood;
 mod newton;
 mod overlap;
+mod part_boundary;
 mod system;
 #[cfg(test)]
 mod test_meshes;
@@ -33,11 +35,13 @@ mod tutte;
 use nalgebra::Point2;
 use thiserror::Error;
 
-pub use injective::{Injective, make_injective};
+pub use barrier::{BOUNDARY_REACH, boundary_is_tight};
+pub use injective::{Injective, InjectiveMap, clear_flips, clear_locally, make_injective};
 pub use measure::{
     l2_of_positions, l2_stretch, l2_unsigned, linf_stretch, plane_area, rescale_to_equal_area, surface_area,
 };
 pub use overlap::{BoundaryDefect, boundary_defect, boundary_is_simple, first_flip};
+pub use part_boundary::part_boundary;
 pub use tutte::{TutteBoundary, tutte_embedding};
 
 use crate::distortion::RestTriangle;
@@ -89,8 +93,9 @@ impl StretchSettings {
 pub struct MinimiseOptions {
     /// Give up as soon as the chart's L2 stretch is clearly not going to come under this.
     pub abandon_above: Option<f64>,
-    /// Keep the boundary from touching itself; the start must be simple.
-    pub keep_boundary_simple: bool,
+    /// Keep the boundary from touching itself; the start must be simple. It begins to feel itself at this share of its
+    /// edges' lengths; [`BOUNDARY_REACH`] is usual.
+    pub keep_apart: Option<f64>,
     /// Seed of the random lines.
     pub seed: u64,
 }
@@ -106,6 +111,9 @@ pub struct Minimised {
     pub iterations: usize,
     /// Whether it was given up because of [`MinimiseOptions::abandon_above`].
     pub abandoned: bool,
+    /// Under any limit below this it would have been given up, sooner or now, and under no other so far: −∞ where it came
+    /// to rest before anything could be told.
+    pub abandoned_below: f64,
     /// Whether the last iteration gained less than the tolerance.
     pub converged: bool,
 }
@@ -149,7 +157,7 @@ pub enum StretchError {
 /// and the result is never worse than the start in the energy minimised.
 ///
 /// Minimises the area-normalised L2 stretch, with Newton mixed with some symmetric Dirichlet energy. The boundary is free;
-/// unless [`MinimiseOptions::keep_boundary_simple`] is set it may come to overlap itself.
+/// unless [`MinimiseOptions::keep_apart`] is set it may come to overlap itself.
 /// The minimum is local, but from Tutte's embedding and from other injective starts the same one is
 /// commonly found. O(n^1.5) for a Newton step (about 0.2 s for 100,000 faces), O(n) a sweep.
 ///
@@ -175,7 +183,7 @@ pub fn minimise_stretch(
     if let Some(face) = first_flip(mesh, start) {
         return Err(StretchError::FlippedStart { face });
     }
-    if options.keep_boundary_simple && !boundary_is_simple(mesh, start) {
+    if options.keep_apart.is_some() && !boundary_is_simple(mesh, start) {
         return Err(StretchError::OverlappingStart);
     }
     let mut result = match settings.solver {
@@ -184,6 +192,6 @@ pub fn minimise_stretch(
     };
     let scale = (surface_area(rest) / plane_area(mesh, &result.uv)).sqrt();
     let mut scratch = result.uv.clone();
-    newton::rescale(mesh, &mut result.uv, scale, &mut scratch, options.keep_boundary_simple);
+    newton::rescale(mesh, &mut result.uv, scale, &mut scratch, options.keep_apart.is_some());
     Ok(result)
 }

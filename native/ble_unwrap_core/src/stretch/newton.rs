@@ -4,11 +4,13 @@ use nalgebra::Point2;
 
 use super::barrier::Barrier;
 use super::energy::StretchEnergy;
+use super::measure::{plane_area, surface_area};
+use super::neighbourhood::Neighbourhood;
 use super::overlap::{boundary_is_simple, first_flip};
 use super::system::{ChartSystem, advance};
 use super::{MinimiseOptions, Minimised, StretchError, StretchSettings};
-use crate::distortion::RestTriangle;
-use crate::mesh::TriMesh;
+use crate::distortion::{RestTriangle, squared_stretch};
+use crate::mesh::{FaceId, TriMesh};
 use crate::progress::Progress;
 
 /// Armijo's constant: a step must win this share of what its slope promises.
@@ -28,6 +30,24 @@ const ABANDON_AFTER: usize = 5;
 /// A chart is abandoned if so many times its last gain would not bring it under the limit.
 const ABANDON_GAINS: f64 = 4.0;
 
+/// Or if after so many
+const FAR_AFTER: usize = 10;
+/// it is still this far above the limit.
+const FAR: f64 = 1.5;
+/// Under the barrier the last steps win little, and slowly: the tolerance is so many times what it is without.
+const APART_TOLERANCE: f64 = 10.0;
+
+/// A triangle of more than this squared stretch is among the worst,
+const WORST: f64 = 3.0;
+/// which are mended first if they are at most this share of all,
+const MOST_WORST: f64 = 0.05;
+/// so many rings around them,
+const WORST_RINGS: usize = 4;
+/// by so many steps at most, or until one gains less than this share.
+const WORST_STEPS: usize = 12;
+/// See [`WORST_STEPS`].
+const WORST_TOLERANCE: f64 = 1e-2;
+
 /// Minimises over all vertices; `start` has been checked to be positive, and simple if that is to
 /// be kept.
 ///
@@ -42,11 +62,24 @@ pub(super) fn minimise(
     options: &MinimiseOptions,
     progress: &Progress,
 ) -> Result<Minimised, StretchError> {
-    let mut descent = Descent::new(mesh, rest, start, options.keep_boundary_simple)?;
-    let mut result = Minimised { uv: Vec::new(), l2: 0.0, iterations: 0, abandoned: false, converged: false };
+    let mut uv = start.to_vec();
+    let mut scratch = uv.clone();
+    let scale = (surface_area(rest) / plane_area(mesh, &uv)).sqrt();
+    rescale(mesh, &mut uv, scale, &mut scratch, options.keep_apart.is_some());
     let energy = StretchEnergy::new(settings.dirichlet_weight);
     let warm = StretchEnergy::new(settings.dirichlet_weight.max(0.5));
+    relax_worst(mesh, rest, &mut uv, &warm, options.keep_apart.is_some(), progress)?;
+    let mut descent = Descent::new(mesh, rest, uv, Vec::new(), options.keep_apart)?;
+    let mut result = Minimised {
+        uv: Vec::new(),
+        l2: 0.0,
+        iterations: 0,
+        abandoned: false,
+        abandoned_below: f64::NEG_INFINITY,
+        converged: false,
+    };
     let mut l2 = descent.system.stretch_sums(&descent.uv).l2();
+    let tolerance = if descent.barrier.is_some() { APART_TOLERANCE } else { 1.0 } * settings.tolerance;
     for iteration in 0..settings.max_iterations {
         progress.check()?;
         let warm_up = iteration < WARM_UP && descent.system.value(&energy, &descent.uv) > WARM_UP_ABOVE;
@@ -59,15 +92,18 @@ pub(super) fn minimise(
         result.iterations = iteration + 1;
         let l2_before = l2;
         l2 = descent.system.stretch_sums(&descent.uv).l2();
-        if !warm_up && before - after <= settings.tolerance * after {
+        if !warm_up && before - after <= tolerance * after {
             result.converged = true;
             break;
         }
         let gain = (l2_before - l2).max(0.0);
-        let out_of_reach = |limit: f64| l2 - ABANDON_GAINS * gain > limit;
-        if iteration >= ABANDON_AFTER && options.abandon_above.is_some_and(out_of_reach) {
-            result.abandoned = true;
-            break;
+        if iteration >= ABANDON_AFTER {
+            let far = if iteration >= FAR_AFTER { l2 / FAR } else { f64::NEG_INFINITY };
+            result.abandoned_below = result.abandoned_below.max(l2 - ABANDON_GAINS * gain).max(far);
+            if options.abandon_above.is_some_and(|limit| limit < result.abandoned_below) {
+                result.abandoned = true;
+                break;
+            }
         }
     }
     result.l2 = l2;
@@ -75,30 +111,63 @@ pub(super) fn minimise(
     Ok(result)
 }
 
+/// Lowers the energy around the triangles that are stretched far more than the others, each neighbourhood by itself:
+/// one that is nearly flipped shortens the steps of all. Nothing where there are none, or too many.
+fn relax_worst(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    uv: &mut [Point2<f64>],
+    energy: &StretchEnergy,
+    keep_apart: bool,
+    progress: &Progress,
+) -> Result<(), StretchError> {
+    let stretched =
+        |f: FaceId| squared_stretch(&rest[f.index()].jacobian(mesh.triangle(f).map(|v| uv[v.index()]))) > WORST;
+    let bad: Vec<bool> = mesh.faces().map(stretched).collect();
+    let count = bad.iter().filter(|b| **b).count();
+    if count == 0 || count as f64 > MOST_WORST * bad.len() as f64 {
+        return Ok(());
+    }
+    let near = Neighbourhood::new(mesh, rest, &bad, WORST_RINGS);
+    let mut descent = Descent::new(&near.mesh, &near.rest, near.read(uv), near.pinned.clone(), None)?;
+    for _ in 0..WORST_STEPS {
+        progress.check()?;
+        let Some((before, after)) = descent.step(&near.mesh, energy) else { break };
+        if before - after <= WORST_TOLERANCE * after {
+            break;
+        }
+    }
+    let mut relaxed = uv.to_vec();
+    near.write(&descent.uv, &mut relaxed);
+    if first_flip(mesh, &relaxed).is_none() && (!keep_apart || boundary_is_simple(mesh, &relaxed)) {
+        uv.copy_from_slice(&relaxed);
+    }
+    Ok(())
+}
+
 /// Everything one Newton step works on.
 struct Descent {
     system: ChartSystem,
     barrier: Option<Barrier>,
+    /// Vertices that stay; none if empty.
+    pinned: Vec<bool>,
     uv: Vec<Point2<f64>>,
     trial: Vec<Point2<f64>>,
     direction: Vec<f64>,
 }
 
 impl Descent {
+    /// From a map at the scale it is to be minimised at.
     fn new(
         mesh: &TriMesh,
         rest: &[RestTriangle],
-        start: &[Point2<f64>],
-        keep_boundary_simple: bool,
+        uv: Vec<Point2<f64>>,
+        pinned: Vec<bool>,
+        keep_apart: Option<f64>,
     ) -> Result<Self, StretchError> {
-        let mut uv = start.to_vec();
-        let system = ChartSystem::new(mesh, rest)?;
-        let mut trial = uv.clone();
-        // The system's areas sum to one, and so do its determinants' if the areas are equal.
-        let scale = 1.0 / system.stretch_sums(&uv).area.sqrt();
-        rescale(mesh, &mut uv, scale, &mut trial, keep_boundary_simple);
-        let barrier = keep_boundary_simple.then(|| Barrier::new(mesh, rest));
-        Ok(Self { system, barrier, direction: vec![0.0; 2 * uv.len()], uv, trial })
+        let barrier = keep_apart.map(|reach| Barrier::new(mesh, rest, reach));
+        let (trial, direction) = (uv.clone(), vec![0.0; 2 * uv.len()]);
+        Ok(Self { system: ChartSystem::new(mesh, rest)?, barrier, pinned, direction, uv, trial })
     }
 
     fn value(&self, energy: &StretchEnergy, uv: &[Point2<f64>]) -> f64 {
@@ -116,7 +185,7 @@ impl Descent {
         if let Some(barrier) = &self.barrier {
             barrier.assemble(&self.uv, &mut self.system);
         }
-        let slope = self.system.solve(&mut self.direction)?;
+        let slope = self.system.solve_pinned(&self.pinned, &mut self.direction)?;
         let mut step = (SAFETY * self.system.first_flip(&self.uv, &self.direction)).min(1.0);
         if let Some(barrier) = &self.barrier {
             step = step.min(SAFETY * barrier.first_contact(&self.uv, &self.direction, step / SAFETY));
@@ -162,7 +231,7 @@ pub(super) fn rescale(
 mod tests {
     use super::*;
     use crate::stretch::test_meshes::{annulus, grid, hemisphere};
-    use crate::stretch::{TutteBoundary, l2_stretch, minimise_stretch, tutte_embedding};
+    use crate::stretch::{BOUNDARY_REACH, TutteBoundary, l2_stretch, minimise_stretch, tutte_embedding};
     use nalgebra::Point3;
 
     fn tutte(mesh: &TriMesh, rest: &[RestTriangle]) -> Vec<Point2<f64>> {
@@ -186,8 +255,8 @@ mod tests {
         let start: Vec<_> = (0..mesh.vertex_count())
             .map(|i| mesh.positions()[i].xy() + nalgebra::Vector2::new(shake(2 * i), shake(2 * i + 1)))
             .collect();
-        for keep_boundary_simple in [false, true] {
-            let got = run(&mesh, &start, 1e-8, MinimiseOptions { keep_boundary_simple, ..Default::default() });
+        for keep_apart in [None, Some(BOUNDARY_REACH)] {
+            let got = run(&mesh, &start, 1e-8, MinimiseOptions { keep_apart, ..Default::default() });
             assert!(got.converged && got.l2 < 1.0 + 1e-6, "{got:?}");
         }
         // From a circle, and with a hole.
@@ -223,8 +292,8 @@ mod tests {
         let mesh = hemisphere(10);
         let rest = RestTriangle::of_mesh(&mesh);
         let start = tutte(&mesh, &rest);
-        for (keep, w) in [(false, 0.0), (false, 0.5), (true, 0.05)] {
-            let mut descent = Descent::new(&mesh, &rest, &start, keep).expect("analysis");
+        for (keep, w) in [(None, 0.0), (None, 0.5), (Some(BOUNDARY_REACH), 0.05)] {
+            let mut descent = Descent::new(&mesh, &rest, start.clone(), Vec::new(), keep).expect("analysis");
             let energy = StretchEnergy::new(w);
             let mut last = descent.value(&energy, &descent.uv);
             let mut steps = 0;
@@ -245,9 +314,9 @@ mod tests {
         let cup = |x: f64, y: f64| 25.0 * (-((x - 10.0).powi(2) + (y - 10.0).powi(2)) / 15.0).exp();
         let mesh = grid(20, 20, |x, y| Point3::new(x, y, cup(x, y)));
         let start = tutte(&mesh, &RestTriangle::of_mesh(&mesh));
-        let free = run(&mesh, &start, 1e-5, MinimiseOptions::default());
+        let free = run(&mesh, &start, 1e-9, MinimiseOptions::default());
         let with =
-            |limit: f64| run(&mesh, &start, 1e-5, MinimiseOptions { abandon_above: Some(limit), ..Default::default() });
+            |limit: f64| run(&mesh, &start, 1e-9, MinimiseOptions { abandon_above: Some(limit), ..Default::default() });
         let hopeless = with(1.01);
         assert!(hopeless.abandoned && !hopeless.converged && hopeless.iterations < free.iterations, "{hopeless:?}");
         let fine = with(free.l2 * 1.001);
@@ -269,7 +338,7 @@ mod tests {
         assert!(boundary_is_simple(&mesh, &start));
         let free = run(&mesh, &start, 1e-4, MinimiseOptions::default());
         assert!(!boundary_is_simple(&mesh, &free.uv), "the free ramp does not overlap: no test");
-        let kept = run(&mesh, &start, 1e-4, MinimiseOptions { keep_boundary_simple: true, ..Default::default() });
+        let kept = run(&mesh, &start, 1e-4, MinimiseOptions { keep_apart: Some(BOUNDARY_REACH), ..Default::default() });
         assert!(boundary_is_simple(&mesh, &kept.uv));
         assert!(kept.l2 < 1.5 && kept.l2 > free.l2, "{} {}", kept.l2, free.l2);
     }
@@ -278,8 +347,9 @@ mod tests {
     fn bad_starts_are_refused() {
         let mesh = ramp();
         let rest = RestTriangle::of_mesh(&mesh);
-        let go = |start: &[Point2<f64>], keep_boundary_simple: bool, progress: &Progress| {
-            let options = MinimiseOptions { keep_boundary_simple, ..Default::default() };
+        let go = |start: &[Point2<f64>], apart: bool, progress: &Progress| {
+            let keep_apart = apart.then_some(BOUNDARY_REACH);
+            let options = MinimiseOptions { keep_apart, ..Default::default() };
             minimise_stretch(&mesh, &rest, start, &StretchSettings::default(), &options, progress)
         };
         let over: Vec<_> = mesh.positions().iter().map(|p| Point2::new(p.x, p.y)).collect();

@@ -51,28 +51,58 @@ pub fn boundary_is_simple(mesh: &TriMesh, uv: &[Point2<f64>]) -> bool {
 /// What [`boundary_is_simple`] finds first, in a fixed order, or `None`.
 #[must_use]
 pub fn boundary_defect(mesh: &TriMesh, uv: &[Point2<f64>]) -> Option<BoundaryDefect> {
+    let mut first = None;
+    let finite = visit_crossings(mesh, uv, |g, h| {
+        first = Some(BoundaryDefect::Crossing(g, h));
+        false
+    });
+    if !finite {
+        return Some(BoundaryDefect::NotFinite);
+    }
+    first.or_else(|| {
+        let loops = mesh.boundary_loops();
+        let positive = loops.iter().filter(|l| is_counter_clockwise(mesh, uv, l)).count();
+        (positive != 1).then_some(BoundaryDefect::Orientation)
+    })
+}
+
+/// The boundary edges that meet others elsewhere than at a common vertex, ascending; all of them if a coordinate is not
+/// finite.
+pub(super) fn boundary_crossings(mesh: &TriMesh, uv: &[Point2<f64>]) -> Vec<HalfedgeId> {
+    let mut found = Vec::new();
+    let finite = visit_crossings(mesh, uv, |g, h| {
+        found.extend([g, h]);
+        true
+    });
+    if !finite {
+        return mesh.halfedges().filter(|&h| mesh.is_boundary(h)).collect();
+    }
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+/// Calls `visit` for pairs of boundary edges that meet, in a fixed order and some more than once, while it
+/// answers true; false if a coordinate is not finite.
+fn visit_crossings(mesh: &TriMesh, uv: &[Point2<f64>], mut visit: impl FnMut(HalfedgeId, HalfedgeId) -> bool) -> bool {
     let edges: Vec<HalfedgeId> = mesh.halfedges().filter(|&h| mesh.is_boundary(h)).collect();
     let ends = |h: HalfedgeId| [uv[mesh.from(h).index()], uv[mesh.to(h).index()]];
     let hull = |i: usize| {
         let [a, b] = ends(edges[i]);
         [a, b, a, b]
     };
-    let Some(grid) = Grid::new(edges.len(), hull, 0.0, usize::MAX) else {
-        return Some(BoundaryDefect::NotFinite);
-    };
+    let Some(grid) = Grid::new(edges.len(), hull, 0.0, usize::MAX) else { return false };
     for cell in grid.cells() {
         for (k, &i) in cell.iter().enumerate() {
             for &j in &cell[..k] {
                 let (g, h) = (edges[j as usize], edges[i as usize]);
-                if edges_meet(mesh, uv, g, h) {
-                    return Some(BoundaryDefect::Crossing(g, h));
+                if edges_meet(mesh, uv, g, h) && !visit(g, h) {
+                    return true;
                 }
             }
         }
     }
-    let loops = mesh.boundary_loops();
-    let positive = loops.iter().filter(|l| is_counter_clockwise(mesh, uv, l)).count();
-    (positive != 1).then_some(BoundaryDefect::Orientation)
+    true
 }
 
 /// Whether two different boundary edges share a point that is not a shared vertex.

@@ -15,6 +15,10 @@ const RIDGE_GROWTH: f64 = 100.0;
 /// ... at most so often, up to a thousandfold diagonal: plain gradient descent.
 const RIDGE_ATTEMPTS: usize = 7;
 
+/// Factor on the diagonal of a pinned vertex: stiff against its neighbours, yet too little to enlarge the ridge, which
+/// is measured by the mean, to anything that counts.
+const PIN_STIFFNESS: f64 = 1e4;
+
 /// A chart's triangles with everything that does not change between Newton steps: hat gradients,
 /// area weights (summing to one), the place of every block in the sparse matrix, the analysed factor.
 pub(super) struct ChartSystem {
@@ -199,6 +203,22 @@ impl ChartSystem {
             ridge *= RIDGE_GROWTH;
         }
         None
+    }
+
+    /// As [`ChartSystem::solve`], but the pinned vertices stay. Pins nothing if the slice is empty.
+    pub(super) fn solve_pinned(&mut self, pinned: &[bool], direction: &mut [f64]) -> Option<f64> {
+        for (v, _) in pinned.iter().enumerate().filter(|p| *p.1) {
+            for k in [2 * v, 2 * v + 1] {
+                self.gradient[k] = 0.0;
+                self.hessian[self.diagonal_entries[k] as usize] *= PIN_STIFFNESS;
+            }
+        }
+        // Without gradient there the slope is the same, and the direction remains one of descent.
+        let slope = self.solve(direction);
+        for (v, _) in pinned.iter().enumerate().filter(|p| *p.1) {
+            direction[2 * v..2 * v + 2].fill(0.0);
+        }
+        slope
     }
 
     /// The greatest step along `direction` at which no triangle has collapsed yet; infinite if none

@@ -5,6 +5,7 @@ imported by its full name.
 """
 
 from ._native import (
+    Analysis,
     Array,
     Atlas,
     BleUnwrapError,
@@ -18,6 +19,7 @@ from ._native import (
     PackedCharts,
     PointAtlas,
     __version__,
+    analyse,
     default_settings,
     embed,
     flatten,
@@ -33,6 +35,7 @@ from ._native import (
 )
 
 __all__ = [
+    "Analysis",
     "Array",
     "Atlas",
     "BleUnwrapError",
@@ -46,6 +49,7 @@ __all__ = [
     "PackedCharts",
     "PointAtlas",
     "__version__",
+    "analyse",
     "default_settings",
     "embed",
     "flatten",

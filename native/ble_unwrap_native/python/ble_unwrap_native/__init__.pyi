@@ -6,6 +6,7 @@ from typing import Any, Literal, TypedDict, Unpack, final, type_check_only
 from typing_extensions import Buffer  # of collections.abc from Python 3.12 on
 
 __all__ = [
+    "Analysis",
     "Array",
     "Atlas",
     "BleUnwrapError",
@@ -19,6 +20,7 @@ __all__ = [
     "PackedCharts",
     "PointAtlas",
     "__version__",
+    "analyse",
     "default_settings",
     "embed",
     "flatten",
@@ -98,10 +100,24 @@ class _FlattenSettings(_GeodesicSettings, _EmbeddingSettings, total=False):
 @type_check_only
 class _Settings(_FlattenSettings, _PackSettings, total=False):
     stretch_limit: float
+    limit_over: Literal["chart", "atlas"]
     coarse: bool
     merge: bool
+    least_sewn: float
     holes: Literal["keep", "cut"]
     chart_scale: Literal["uniform", "stretch"]
+    crease_weight: float
+
+@type_check_only
+class _AnalyseSettings(_Threads, total=False):
+    weld: bool
+
+@final
+class Analysis:
+    @property
+    def weld(self) -> bool: ...
+    def unwrap(self, *, job: Job | None = None, **settings: Unpack[_Settings]) -> Atlas: ...
+    def submit_unwrap(self, *, job: Job | None = None, **settings: Unpack[_Settings]) -> Job: ...
 
 @final
 class Array(Buffer):
@@ -176,6 +192,7 @@ def unwrap(
     *,
     corner_triangles: Buffer | None = None,
     seams: Buffer | None = None,
+    guides: Buffer | None = None,
     job: Job | None = None,
     **settings: Unpack[_Settings],
 ) -> Atlas: ...
@@ -186,9 +203,21 @@ def submit_unwrap(
     *,
     corner_triangles: Buffer | None = None,
     seams: Buffer | None = None,
+    guides: Buffer | None = None,
     job: Job | None = None,
     **settings: Unpack[_Settings],
 ) -> Job: ...
+def analyse(
+    positions: Buffer,
+    corner_vertices: Buffer,
+    face_offsets: Buffer,
+    *,
+    corner_triangles: Buffer | None = None,
+    seams: Buffer | None = None,
+    guides: Buffer | None = None,
+    job: Job | None = None,
+    **settings: Unpack[_AnalyseSettings],
+) -> Analysis: ...
 def unwrap_points(
     positions: Buffer,
     *,

@@ -1,6 +1,7 @@
 //! A coarse mesh of the same surface, by quadric half-edge collapse.
 
 mod collapse;
+mod guides;
 mod nearest;
 mod quadric;
 mod queue;
@@ -15,7 +16,8 @@ use collapse::Collapsing;
 ///
 /// Guaranteed: the coarse mesh has the components, boundary loops and genus of the fine one; its
 /// vertices are vertices of the fine mesh at the same positions, those of its boundary on the same
-/// boundary loop; no two of its edges have the same ends unless that was so in the fine mesh.
+/// boundary loop; no two of its edges have the same ends unless that was so in the fine mesh. The image of a chain of
+/// guides is a chain of guides.
 ///
 /// Not guaranteed: that no two of its faces intersect; that a coarse face has any fine face; that
 /// the fine faces of a connected set of coarse faces are connected (nearly always they are).
@@ -40,7 +42,7 @@ pub struct Coarse {
 ///
 /// Vertices collapse into neighbours in the order of the quadric error this makes (Garland and
 /// Heckbert, "Surface simplification using quadric error metrics", 1997, section 4, with its
-/// boundary planes of section 6), with area weights and a small term for length that coarsens flat
+/// boundary planes of section 6, which guides have too), with area weights and a small term for length that coarsens flat
 /// places evenly. A boundary vertex moves along its boundary only. A collapse is not made where it
 /// would change the topology, turn a face by more than 60° or make a needle of it. Any manifold mesh
 /// will do: closed, of any genus, of several components, with degenerate faces; some of these stop
@@ -60,6 +62,7 @@ pub fn coarsen(mesh: &TriMesh, target_vertices: usize, progress: &Progress) -> R
         number[v.index()] = VertexId::new(i);
     }
     let vertex: Vec<VertexId> = collapsing.roots().iter().map(|root| number[root.index()]).collect();
+    let coarse = guides::carried_over(mesh, coarse, &vertex);
     let face = nearest_or_same(mesh, &coarse, &vertex, collapsing.removed().is_empty(), progress)?;
 
     let before = collapsing.removed().len();

@@ -6,7 +6,7 @@ use crate::mesh::TriMesh;
 use crate::mesh::measure::area_vector;
 use crate::progress::{Cancelled, Progress};
 
-/// Weight of the planes that stand on boundary edges, in squared edge lengths. Ten times that of a
+/// Weight of the planes that stand on boundary edges and on guides, in squared edge lengths. Ten times that of a
 /// face: a boundary shows, and it cannot be mended by a vertex beyond it.
 const BOUNDARY_WEIGHT: f64 = 10.0;
 
@@ -86,7 +86,7 @@ impl std::ops::AddAssign for Quadric {
     }
 }
 
-/// At each vertex a third of its faces' planes, weighted by area, and for boundary edges half of a
+/// At each vertex a third of its faces' planes, weighted by area, and for boundary edges and guides half of a
 /// plane along the edge perpendicular to the face.
 pub(super) fn initial_quadrics(
     mesh: &TriMesh,
@@ -106,7 +106,7 @@ pub(super) fn initial_quadrics(
             let q = Quadric::plane(n, p[0], third).with_area(third);
             mesh.triangle(f).iter().for_each(|v| quadrics[v.index()] += q);
         }
-        for h in f.halfedges().into_iter().filter(|&h| mesh.is_boundary(h)) {
+        for h in f.halfedges().into_iter().filter(|&h| mesh.is_boundary(h) || mesh.is_guide(h)) {
             let side = p[(h.slot() + 1) % 3] - p[h.slot()];
             let Some(u) = side.try_normalize(0.0) else { continue };
             let weight = 0.5 * BOUNDARY_WEIGHT * side.norm_squared();

@@ -15,7 +15,7 @@ fn conditioned(poly: &PolyMesh) -> TriMesh {
         corner_vertices: &flat.corner_vertices,
         face_offsets: &flat.face_offsets,
         corner_triangles: None,
-        seams: &[],
+        ..MeshInput::default()
     };
     condition(&input, &ConditionOptions::default(), &Progress::new()).expect("a valid mesh").mesh
 }

@@ -1,0 +1,160 @@
+//! A mesh made ready to be unwrapped again and again.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::charts::{Chart, Patch};
+use crate::error::UnwrapError;
+use crate::mesh::{self, ConditionOptions, MeshInput, Surface};
+use crate::packing::PackSettings;
+use crate::progress::{Cancelled, Progress, Stage};
+use crate::settings::{ChartScale, LimitOver, Settings};
+
+use super::memo::{self, Fingerprint, Kind, Memo, Run};
+use super::rungs::Rungs;
+use super::tally::Tally;
+use super::{Atlas, Clock, budget, component, finish};
+
+/// A mesh and what was found out about it, for unwrapping it several times with different settings.
+///
+/// Guaranteed: [`Analysis::unwrap`] gives what [`unwrap`](crate::unwrap()) gives with the same mesh and settings, bit for
+/// bit (times apart), whatever was unwrapped before and by how many threads at once.
+///
+/// Not guaranteed: that a second call is faster, as it will be if little but the limit differs.
+#[derive(Debug)]
+pub struct Analysis {
+    positions: Vec<[f64; 3]>,
+    corner_vertices: Vec<i32>,
+    face_offsets: Vec<i32>,
+    weld: bool,
+    prepared: Prepared,
+    memo: Memo,
+}
+
+impl Analysis {
+    /// Copies the mesh and conditions it; `weld` as in [`Settings`]. O(n log n).
+    ///
+    /// # Errors
+    /// [`UnwrapError::Mesh`] if the arrays do not make a mesh; cancelled.
+    pub fn new(input: &MeshInput<'_>, weld: bool, progress: &Progress) -> Result<Self, UnwrapError> {
+        progress.check()?;
+        progress.enter(Stage::Condition);
+        let prepared = Prepared::new(input, weld, progress)?;
+        Ok(Self {
+            memo: Memo::new(prepared.surface.mesh.face_count()),
+            prepared,
+            positions: input.positions.to_vec(),
+            corner_vertices: input.corner_vertices.to_vec(),
+            face_offsets: input.face_offsets.to_vec(),
+            weld,
+        })
+    }
+
+    /// Whether vertices at the same position count as one.
+    #[must_use]
+    pub fn weld(&self) -> bool {
+        self.weld
+    }
+
+    /// Number of faces of the mesh.
+    #[must_use]
+    pub fn face_count(&self) -> usize {
+        self.face_offsets.len().saturating_sub(1)
+    }
+
+    /// As [`unwrap`](crate::unwrap()) of the mesh.
+    ///
+    /// # Errors
+    /// As there; also if `settings.weld` is not what the mesh was analysed with.
+    pub fn unwrap(&self, settings: &Settings, progress: &Progress) -> Result<Atlas, UnwrapError> {
+        progress.check()?;
+        settings.validate()?;
+        if settings.weld != self.weld {
+            let value = settings.weld.to_string();
+            let allowed = if self.weld { "true, as in the analysis" } else { "false, as in the analysis" };
+            return Err(UnwrapError::Setting { name: "weld", value, allowed });
+        }
+        let input = MeshInput {
+            positions: &self.positions,
+            corner_vertices: &self.corner_vertices,
+            face_offsets: &self.face_offsets,
+            ..MeshInput::default()
+        };
+        self.memo.begin();
+        self.prepared.unwrap(&input, settings, Clock::new(), &Run::new(progress, Some(&self.memo)))
+    }
+}
+
+/// The charts of a component, and how they came about.
+type Made = (Vec<Chart>, Rungs);
+
+/// The charts of a component, or what they were under the same settings but for those of later stages.
+fn charts_of(
+    patch: &Patch,
+    settings: &Settings,
+    tally: &Tally<'_>,
+    progress: &Run<'_>,
+) -> Result<Arc<Made>, Cancelled> {
+    let input = |f: &mut Fingerprint| {
+        f.mesh(&patch.mesh);
+        f.numbers(&patch.polygon);
+        // They are named in the result.
+        f.indices(patch.faces.iter().map(|face| face.index()));
+        f.indices(patch.vertices.iter().map(|v| v.index()));
+        f.settings(&Settings {
+            limit_over: LimitOver::Chart,
+            chart_scale: ChartScale::Uniform,
+            packing: PackSettings::default(),
+            ..settings.clone()
+        });
+    };
+    let bytes = |made: &Made| made.0.iter().map(|c| memo::bytes_of(&c.patch.mesh) + 24 * c.uv.len()).sum();
+    progress.recall(Kind::Charts, input, bytes, || component::charts(patch, settings, tally, progress))
+}
+
+/// The surface of a mesh in connected pieces.
+#[derive(Debug)]
+pub(super) struct Prepared {
+    surface: Surface,
+    patches: Vec<Patch>,
+}
+
+impl Prepared {
+    pub(super) fn new(input: &MeshInput<'_>, weld: bool, progress: &Progress) -> Result<Self, UnwrapError> {
+        let surface = mesh::condition(input, &ConditionOptions { weld }, progress)?;
+        let patches = Patch::components(&surface.mesh, &surface.polygon);
+        Ok(Self { surface, patches })
+    }
+
+    /// The stages after conditioning. Of `input` only positions, corners and offsets are looked at.
+    pub(super) fn unwrap(
+        &self,
+        input: &MeshInput<'_>,
+        settings: &Settings,
+        mut clock: Clock,
+        progress: &Run<'_>,
+    ) -> Result<Atlas, UnwrapError> {
+        progress.enter(Stage::Charts);
+        let (surface, patches) = (&self.surface, &self.patches);
+        let tally = Tally::new(progress, surface.mesh.face_count());
+        let made: Vec<Result<Arc<Made>, Cancelled>> =
+            patches.par_iter().with_max_len(1).map(|patch| charts_of(patch, settings, &tally, progress)).collect();
+        let (mut charts, mut rungs) = (Vec::new(), Rungs::default());
+        for component in made {
+            let component = component?;
+            rungs.add(&component.1);
+            match Arc::try_unwrap(component) {
+                Ok((more, _)) => charts.extend(more),
+                Err(kept) => charts.extend_from_slice(&kept.0),
+            }
+        }
+        if settings.limit_over == LimitOver::Atlas && settings.merge {
+            let (joined, steps) = budget::spend(&surface.mesh, &surface.polygon, charts, settings, progress)?;
+            charts = joined;
+            rungs.add(&steps);
+        }
+        clock.lap("charts");
+        finish::finish(input, surface, charts, rungs, settings, clock, progress)
+    }
+}

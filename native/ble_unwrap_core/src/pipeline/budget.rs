@@ -1,0 +1,170 @@
+//! Charts joined beyond the limit for as long as the atlas keeps it on the whole.
+//!
+//! UVAtlas bounds the stretch of the whole atlas, so that a chart may exceed the limit where others have room to spare.
+//! Here the charts under the limit are joined further, least added stretch per length of border saved first.
+
+use rayon::prelude::*;
+
+use crate::charts::Chart;
+use crate::mesh::{HalfedgeId, TriMesh};
+use crate::progress::Cancelled;
+use crate::settings::Settings;
+
+use super::memo::Run;
+use super::rungs::{Rung, Rungs};
+use super::sew;
+
+/// Share of the budget that is left for rounding to single precision.
+const RESERVE: f64 = 1e-4;
+
+/// Two neighbours and what their union would be.
+struct Union {
+    /// Places in the pool.
+    pair: [usize; 2],
+    chart: Chart,
+    /// Area times squared stretch that it has more than its parts.
+    added: f64,
+    /// That over the length of border that it saves.
+    price: f64,
+}
+
+/// A chart in the pool, and its share in the sum of area times squared L2 stretch.
+struct Member {
+    chart: Chart,
+    area: f64,
+    stretch: f64,
+}
+
+impl Member {
+    fn new(chart: Chart) -> Self {
+        let area = chart.patch.area();
+        Self { stretch: area * chart.l2 * chart.l2, area, chart }
+    }
+}
+
+/// Joins neighbouring charts of a surface while the area-weighted mean of the squared L2 stretch of the charts stays
+/// under the square of `settings.stretch_limit`, and each chart under [`Settings::chart_limit`]. Charts come sorted by
+/// lowest face, their faces named as in `mesh`.
+///
+/// Every pair of neighbours is flattened together once, and every union that is taken with each of its neighbours: some
+/// ten trials a chart.
+pub(super) fn spend(
+    mesh: &TriMesh,
+    polygon: &[u32],
+    charts: Vec<Chart>,
+    settings: &Settings,
+    progress: &Run<'_>,
+) -> Result<(Vec<Chart>, Rungs), Cancelled> {
+    let mut pool = Pool::new(mesh, polygon, charts, settings);
+    let mut rungs = Rungs::default();
+    let mut offers = pool.offers(pool.neighbours(None), progress)?;
+    loop {
+        progress.check()?;
+        let left = pool.left();
+        let price = |i: usize| (offers[i].price, offers[i].pair);
+        let payable = (0..offers.len()).filter(|&i| offers[i].added <= left);
+        let best = payable.min_by(|&i, &j| price(i).0.total_cmp(&price(j).0).then(price(i).1.cmp(&price(j).1)));
+        let Some(best) = best else { break };
+        let Union { pair, chart, .. } = offers.swap_remove(best);
+        rungs.take(Rung::Merge);
+        let joined = pool.join(pair, chart);
+        offers.retain(|o| o.pair.iter().all(|i| !pair.contains(i)));
+        offers.extend(pool.offers(pool.neighbours(Some(joined)), progress)?);
+    }
+    let mut charts: Vec<Chart> = pool.members.into_iter().flatten().map(|m| m.chart).collect();
+    charts.sort_by_key(|c| c.patch.faces.iter().min().copied());
+    Ok((charts, rungs))
+}
+
+struct Pool<'a> {
+    mesh: &'a TriMesh,
+    polygon: &'a [u32],
+    settings: &'a Settings,
+    /// Those that were joined to others are gone.
+    members: Vec<Option<Member>>,
+    /// Place of each face of the surface.
+    owner: Vec<usize>,
+    /// What the sum of area times squared stretch may come to.
+    budget: f64,
+    spent: f64,
+}
+
+impl<'a> Pool<'a> {
+    fn new(mesh: &'a TriMesh, polygon: &'a [u32], charts: Vec<Chart>, settings: &'a Settings) -> Self {
+        let members: Vec<Option<Member>> = charts.into_iter().map(|c| Some(Member::new(c))).collect();
+        let mut owner = vec![usize::MAX; mesh.face_count()];
+        for (i, member) in members.iter().enumerate() {
+            for f in member.iter().flat_map(|m| &m.chart.patch.faces) {
+                owner[f.index()] = i;
+            }
+        }
+        let area: f64 = members.iter().flatten().map(|m| m.area).sum();
+        let spent = members.iter().flatten().map(|m| m.stretch).sum();
+        let budget = (1.0 - RESERVE) * settings.stretch_limit.powi(2) * area;
+        Self { mesh, polygon, settings, members, owner, budget, spent }
+    }
+
+    fn left(&self) -> f64 {
+        self.budget - self.spent
+    }
+
+    /// Length of the border between each pair of neighbours, or of one chart and its neighbours, by pair.
+    fn neighbours(&self, of: Option<usize>) -> Vec<([usize; 2], f64)> {
+        let side = |h: HalfedgeId| {
+            let t = self.mesh.twin(h);
+            if t.is_none() {
+                return None;
+            }
+            let (a, b) = (self.owner[h.face().index()], self.owner[t.face().index()]);
+            let wanted = a != b && a != usize::MAX && b != usize::MAX;
+            wanted.then(|| ([a.min(b), a.max(b)], self.mesh.edge_length(h) * self.mesh.border_cost(h)))
+        };
+        let mut sides: Vec<([usize; 2], f64)> = match of.map(|i| &self.members[i]) {
+            None => self.mesh.edges().filter_map(side).collect(),
+            Some(member) => {
+                let faces = member.iter().flat_map(|m| &m.chart.patch.faces);
+                faces.flat_map(|f| f.halfedges()).filter_map(side).collect()
+            }
+        };
+        sides.sort_by_key(|s| s.0);
+        let total = |group: &[([usize; 2], f64)]| (group[0].0, group.iter().map(|s| s.1).sum());
+        sides.chunk_by(|s, t| s.0 == t.0).map(total).collect()
+    }
+
+    /// The unions of pairs of neighbours that flatten within what is left.
+    fn offers(&self, pairs: Vec<([usize; 2], f64)>, progress: &Run<'_>) -> Result<Vec<Union>, Cancelled> {
+        let offer = |(pair, saved): ([usize; 2], f64)| {
+            progress.check()?;
+            let [Some(a), Some(b)] = pair.map(|i| self.members[i].as_ref()) else { return Ok(None) };
+            let most = ((self.left() + a.stretch + b.stretch) / (a.area + b.area)).sqrt();
+            let mut settings = self.settings.clone();
+            settings.stretch_limit = most.min(self.settings.chart_limit());
+            if settings.stretch_limit.is_nan() || settings.stretch_limit <= 1.0 {
+                return Ok(None);
+            }
+            let sides = [&a.chart, &b.chart];
+            let union = sew::joined(self.mesh, self.polygon, sides, &settings, &mut Rungs::default(), progress)?;
+            Ok(union.map(|chart| {
+                let added = (a.area + b.area) * chart.l2 * chart.l2 - a.stretch - b.stretch;
+                Union { pair, chart, added, price: added / saved.max(f64::MIN_POSITIVE) }
+            }))
+        };
+        let offers: Vec<Result<Option<Union>, Cancelled>> = pairs.into_par_iter().with_max_len(1).map(offer).collect();
+        offers.into_iter().filter_map(Result::transpose).collect()
+    }
+
+    /// Takes a union in place of its parts; returns its place.
+    fn join(&mut self, pair: [usize; 2], chart: Chart) -> usize {
+        let place = self.members.len();
+        for f in &chart.patch.faces {
+            self.owner[f.index()] = place;
+        }
+        for i in pair {
+            self.spent -= self.members[i].take().map_or(0.0, |m| m.stretch);
+        }
+        let member = Member::new(chart);
+        self.spent += member.stretch;
+        self.members.push(Some(member));
+        place
+    }
+}

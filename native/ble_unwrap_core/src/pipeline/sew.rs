@@ -1,0 +1,229 @@
+//! Two flattened charts laid side by side and joined along their border.
+//!
+//! Both are flat already and hardly stretched, so the union needs neither distances nor an embedding: one chart is
+//! moved rigidly until the border meets, what does not meet is shared between both sides, and the stretch is minimised
+//! from there. How far the border stays apart tells early that a union is hopeless.
+
+use nalgebra::{Point2, Rotation2, Vector2};
+
+use crate::charts::{Chart, Patch};
+use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::progress::Cancelled;
+use crate::settings::{Holes, Settings};
+
+use super::flatten;
+use super::memo::Run;
+use super::rungs::{Rung, Rungs};
+
+/// The charts' vertices share what is left of the gap over about the root of so many rings.
+const SWEEPS: usize = 40;
+
+/// The union of two neighbouring charts of `mesh` as one chart under the limit; `None` where it has not that topology or
+/// is over the limit. First sewn all along their border; where that has several stretches, also along the longest alone,
+/// and cut open along the others.
+pub(super) fn joined(
+    mesh: &TriMesh,
+    polygon: &[u32],
+    [a, b]: [&Chart; 2],
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Run<'_>,
+) -> Result<Option<Chart>, Cancelled> {
+    let sides = Sides { mesh, a: Side::new(a), b: Side::new(b) };
+    let stretches = sides.stretches();
+    let length = |s: &[Sewn]| s.iter().map(|e| mesh.edge_length(e.surface)).sum::<f64>();
+    let longest = stretches.iter().max_by(|s, t| length(s).total_cmp(&length(t)).then(t[0].surface.cmp(&s[0].surface)));
+    let Some(longest) = longest else { return Ok(None) };
+    let everything = stretches.concat();
+    let mut ways = vec![everything.as_slice()];
+    if stretches.len() > 1 {
+        ways.push(longest);
+    }
+    for seam in ways {
+        progress.check()?;
+        let patch = sides.union(polygon, seam);
+        let topology = patch.mesh.topology();
+        if !topology.is_chart() || (settings.holes != Holes::Keep && topology.loops > 1) {
+            continue;
+        }
+        let start = sides.start(&patch, seam);
+        if let Some(flat) = flatten::polish(&patch, &start, Rung::Sewn, settings, rungs, progress)? {
+            return Ok(Some(flat.into_chart(patch)));
+        }
+    }
+    Ok(None)
+}
+
+/// An edge of the border: on the surface and on both charts.
+#[derive(Clone, Copy)]
+struct Sewn {
+    surface: HalfedgeId,
+    a: HalfedgeId,
+    b: HalfedgeId,
+}
+
+/// A chart, and where the surface's faces are in it.
+struct Side<'a> {
+    chart: &'a Chart,
+    place: Vec<(FaceId, FaceId)>,
+}
+
+impl<'a> Side<'a> {
+    fn new(chart: &'a Chart) -> Self {
+        let mut place: Vec<_> = chart.patch.faces.iter().enumerate().map(|(i, &f)| (f, FaceId::new(i))).collect();
+        place.sort_unstable();
+        Self { chart, place }
+    }
+
+    fn local(&self, f: FaceId) -> Option<FaceId> {
+        self.place.binary_search_by_key(&f, |e| e.0).ok().map(|at| self.place[at].1)
+    }
+
+    /// A half-edge of the surface as one of the chart.
+    fn halfedge(&self, h: HalfedgeId) -> Option<HalfedgeId> {
+        Some(self.local(h.face())?.halfedge(h.slot()))
+    }
+
+    fn mesh(&self) -> &TriMesh {
+        &self.chart.patch.mesh
+    }
+
+    fn uv(&self, v: VertexId) -> Point2<f64> {
+        self.chart.uv[v.index()]
+    }
+}
+
+/// Two neighbouring charts of a surface.
+struct Sides<'a> {
+    mesh: &'a TriMesh,
+    a: Side<'a>,
+    b: Side<'a>,
+}
+
+impl Sides<'_> {
+    /// The stretches of the border, each an unbroken run of edges along both charts.
+    fn stretches(&self) -> Vec<Vec<Sewn>> {
+        let shared = |h: HalfedgeId| {
+            let surface = self.a.chart.patch.faces[h.face().index()].halfedge(h.slot());
+            let twin = self.mesh.twin(surface);
+            if twin.is_none() {
+                return None;
+            }
+            Some(Sewn { surface, a: h, b: self.b.halfedge(twin)? })
+        };
+        let goes_on = |s: &Sewn, next: &Sewn| {
+            self.a.mesh().next_boundary(s.a) == next.a && self.b.mesh().next_boundary(next.b) == s.b
+        };
+        let mut stretches: Vec<Vec<Sewn>> = Vec::new();
+        for edges in self.a.mesh().boundary_loops().iter() {
+            let first = stretches.len();
+            for sewn in edges.iter().filter_map(|&h| shared(h)) {
+                match stretches[first..].last_mut() {
+                    Some(run) if run.last().is_some_and(|last| goes_on(last, &sewn)) => run.push(sewn),
+                    _ => stretches.push(vec![sewn]),
+                }
+            }
+            // The run that the loop's beginning has cut in two.
+            if stretches.len() > first + 1 {
+                let (head, tail) = (&stretches[first], &stretches[stretches.len() - 1]);
+                if goes_on(&tail[tail.len() - 1], &head[0])
+                    && let Some(mut tail) = stretches.pop()
+                {
+                    tail.append(&mut stretches[first]);
+                    stretches[first] = tail;
+                }
+            }
+        }
+        stretches
+    }
+
+    /// Both charts as one patch, open where they were, and where their border is not in `seam`.
+    fn union(&self, polygon: &[u32], seam: &[Sewn]) -> Patch {
+        let mut sewn: Vec<HalfedgeId> = seam.iter().map(|s| s.surface).collect();
+        sewn.sort_unstable();
+        let mut faces: Vec<FaceId> = self.a.place.iter().chain(&self.b.place).map(|p| p.0).collect();
+        faces.sort_unstable();
+        let is_cut = |h: HalfedgeId| {
+            let side = if self.a.local(h.face()).is_some() { &self.a } else { &self.b };
+            let inside = side.halfedge(h).is_some_and(|local| !side.mesh().is_boundary(local));
+            !inside && sewn.binary_search(&h).is_err() && sewn.binary_search(&self.mesh.twin(h)).is_err()
+        };
+        let (mesh, vertices) = self.mesh.submesh(&faces, is_cut);
+        Patch { mesh, vertices, polygon: faces.iter().map(|f| polygon[f.index()]).collect(), faces }
+    }
+
+    /// A position in the plane for each vertex of the union.
+    fn start(&self, patch: &Patch, seam: &[Sewn]) -> Vec<Point2<f64>> {
+        let moved = self.alignment(seam);
+        let n = patch.mesh.vertex_count();
+        // For each side: where it puts the vertex, if it has it.
+        let mut places = [vec![None; n], vec![None; n]];
+        for (f, corners) in patch.faces.iter().zip(patch.mesh.triangles()) {
+            let (side, local) = match (self.a.local(*f), self.b.local(*f)) {
+                (Some(local), _) => (0, local),
+                (None, Some(local)) => (1, local),
+                (None, None) => continue,
+            };
+            let chart = [&self.a, &self.b][side];
+            for (v, own) in corners.iter().zip(chart.mesh().triangle(local)) {
+                let p = chart.uv(own);
+                places[side][v.index()] = Some(if side == 0 { p } else { moved(p) });
+            }
+        }
+        met(&patch.mesh, &places)
+    }
+
+    /// The rigid motion of the second chart that takes its side of the seam nearest to the first's, by length.
+    fn alignment(&self, seam: &[Sewn]) -> impl Fn(Point2<f64>) -> Point2<f64> + use<> {
+        let pairs = || {
+            seam.iter().flat_map(|s| {
+                let (a, b) = (self.a.mesh(), self.b.mesh());
+                let weight = self.mesh.edge_length(s.surface);
+                [(a.from(s.a), b.to(s.b)), (a.to(s.a), b.from(s.b))]
+                    .map(|(v, w)| (self.a.uv(v).coords, self.b.uv(w).coords, weight))
+            })
+        };
+        let total: f64 = pairs().map(|p| p.2).sum::<f64>().max(f64::MIN_POSITIVE);
+        let (to, from) = pairs().fold((Vector2::zeros(), Vector2::zeros()), |(to, from), (p, q, w)| {
+            (to + p * (w / total), from + q * (w / total))
+        });
+        let (cos, sin) = pairs().fold((0.0, 0.0), |(cos, sin), (p, q, w)| {
+            let (p, q) = (p - to, q - from);
+            (cos + w * q.dot(&p), sin + w * q.perp(&p))
+        });
+        let turn = Rotation2::new(f64::atan2(sin, cos));
+        move |p| Point2::from(turn * (p.coords - from) + to)
+    }
+}
+
+/// A position for each vertex of a union, from where either side puts those it has: what they share lies in the middle,
+/// and the rest gives way towards it.
+pub(super) fn met(mesh: &TriMesh, places: &[Vec<Option<Point2<f64>>>; 2]) -> Vec<Point2<f64>> {
+    let mut start = vec![Point2::origin(); mesh.vertex_count()];
+    let middle: Vec<Option<Point2<f64>>> =
+        places[0].iter().zip(&places[1]).map(|(p, q)| Some(nalgebra::center(&(*p)?, &(*q)?))).collect();
+    for places in places {
+        let shift = spread_shift(mesh, places, &middle);
+        for ((to, place), shift) in start.iter_mut().zip(places).zip(shift) {
+            if let Some(p) = place {
+                *to = p + shift;
+            }
+        }
+    }
+    start
+}
+
+/// How far each vertex of a side moves when its border moves to the middle between both sides: less and less, away from
+/// the border.
+fn spread_shift(mesh: &TriMesh, places: &[Option<Point2<f64>>], middle: &[Option<Point2<f64>>]) -> Vec<Vector2<f64>> {
+    let mut shift: Vec<Vector2<f64>> =
+        middle.iter().zip(places).map(|(m, p)| m.zip(*p).map_or_else(Vector2::zeros, |(m, p)| m - p)).collect();
+    for _ in 0..SWEEPS {
+        for v in mesh.vertices().filter(|v| places[v.index()].is_some() && middle[v.index()].is_none()) {
+            let (sum, count) =
+                mesh.neighbours(v).fold((Vector2::zeros(), 0.0), |(s, n), w| (s + shift[w.index()], n + 1.0));
+            shift[v.index()] = sum / count;
+        }
+    }
+    shift
+}

@@ -1,0 +1,208 @@
+"""What steers the borders of charts and what the limit bounds; the analysis that several calls share."""
+
+import gc
+import threading
+
+import ble_unwrap_native as native
+import conftest
+import numpy as np
+import pytest
+from native_calls import QUICK, arrays, submit, unwrap
+from numpy.testing import assert_array_equal
+
+
+@pytest.fixture(scope="module")
+def blob():
+    """A closed surface with bumps, 1,536 faces."""
+    positions, corners, offsets = conftest.sphere(48, 32)
+    x, y, z = positions.T
+    radius = 1 + 0.25 * np.sin(7 * x + 1) * np.cos(8 * y) + 0.2 * np.sin(9 * z)
+    return positions * radius[:, None], corners, offsets
+
+
+def sides(mesh, keep):
+    """The sides of faces both of whose ends are kept, as pairs of vertices, lower first."""
+    _, corners, offsets = mesh
+    following = np.arange(1, len(corners) + 1)
+    following[offsets[1:] - 1] = offsets[:-1]
+    ends = np.sort(np.stack([corners, corners[following]], axis=1), axis=1)
+    return np.unique(ends[keep[ends].all(axis=1)], axis=0).astype(np.int32)
+
+
+def borders(mesh, chart):
+    """The sides with a chart of their own on either side."""
+    _, corners, offsets = mesh
+    following = np.arange(1, len(corners) + 1)
+    following[offsets[1:] - 1] = offsets[:-1]
+    owner = np.repeat(chart, np.diff(offsets))
+    found = {}
+    for a, b, c in zip(corners, corners[following], owner, strict=True):
+        found.setdefault((min(a, b), max(a, b)), set()).add(c)
+    return {side for side, charts in found.items() if len(charts) > 1}
+
+
+# Guides and creases ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("index", [np.int32, np.int64])
+def test_borders_follow_guides(ball, index):
+    height = ball[0][:, 2]
+    level = np.unique(height.round(9))[9]
+    guides = sides(ball, np.isclose(height, level))
+    assert len(guides) == 24
+    wanted = set(map(tuple, guides.tolist()))
+    share = {}
+    for name, given in {"with": {"guides": guides.astype(index)}, "without": {}}.items():
+        chart = arrays(unwrap(*ball, **given))[1]
+        share[name] = len(borders(ball, chart) & wanted) / len(wanted)
+    assert share["with"] > 0.9 > 0.6 > share["without"], share
+
+
+def test_guides_cut_nothing_that_needs_no_border(hill):
+    everything = sides(hill, np.ones(len(hill[0]), bool))
+    report = unwrap(*hill, guides=everything).report
+    assert report["charts"] == 1
+    cut = unwrap(*hill, seams=sides(hill, hill[0][:, 0] == 0.5)).report
+    assert cut["charts"] == 2, "seams are cut"
+
+
+def test_wrong_guides_are_named(square):
+    with pytest.raises(native.InvalidArgumentError, match=r"guides: .* of shape \(g, 2\)"):
+        native.unwrap(*square, guides=np.zeros((1, 3), np.int32))
+    with pytest.raises(native.InvalidMeshError, match="guide 1 names vertex 7"):
+        native.unwrap(*square, guides=np.array([[0, 1], [1, 7]], np.int32))
+
+
+def test_crease_weight_draws_borders_to_creases():
+    """A barrel with bulging sides: the rims are creases, and not where the shortest borders are."""
+    unit, corners, offsets = conftest.sphere(48, 32)
+    along = 4 * np.arccos(np.clip(unit[:, 2], -1, 1)) / np.pi  # the lids below 1 and above 3
+    radius = np.interp(along, [0, 1, 3, 4], [0, 1, 1, 0]) + 0.6 * np.sin(np.pi * np.clip((along - 1) / 2, 0, 1))
+    angle = np.arctan2(unit[:, 1], unit[:, 0])
+    height = np.interp(along, [0, 1, 3, 4], [1.3, 1, -1, -1.3])
+    mesh = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1), corners, offsets
+    rims = set(map(tuple, sides(mesh, np.isclose(along, 1) | np.isclose(along, 3)).tolist()))
+    assert len(rims) == 96
+    on_rim = {}
+    for weight in (0, 1, 2):
+        atlas = unwrap(*mesh, crease_weight=weight, stretch_limit=1.02, merge=False)
+        on_rim[weight] = len(borders(mesh, arrays(atlas)[1]) & rims)
+    assert on_rim[0] < 10 and min(on_rim[1], on_rim[2]) > 30, on_rim
+
+
+@pytest.mark.parametrize("value", [-0.1, 5, "much", None, float("nan")])
+def test_crease_weight_out_of_range(square, value):
+    with pytest.raises(native.InvalidArgumentError, match="crease_weight: expected a number at least 0 and at most 2"):
+        native.unwrap(*square, crease_weight=value)
+
+
+# Limit over the atlas -------------------------------------------------------------------------------------------------
+
+
+def test_a_limit_over_the_atlas(blob):
+    charts = unwrap(*blob, stretch_limit=1.02).report
+    atlas = unwrap(*blob, stretch_limit=1.02, limit_over="atlas").report
+    assert charts["chart_limit"] == 1.02 and charts["atlas_limit"] is None
+    assert atlas["chart_limit"] == pytest.approx(1.08) and atlas["atlas_limit"] == 1.02
+    assert atlas["charts"] < charts["charts"] and atlas["seam_length"] < charts["seam_length"]
+    assert 1.02 < atlas["l2_worst_chart"] <= 1.08, "single charts have more than the limit"
+    assert charts["l2"] < atlas["l2"] <= 1.02
+    assert atlas["charts_over_limit"] == [] and atlas["warnings"] == []
+    assert atlas["flips"] == atlas["overlaps"] == 0
+    with pytest.raises(native.InvalidArgumentError, match="limit_over: expected 'chart' or 'atlas'; found 'mesh'"):
+        unwrap(*blob, limit_over="mesh")
+
+
+# Analysis -------------------------------------------------------------------------------------------------------------
+
+
+def same(one, other):
+    for a, b in zip(arrays(one), arrays(other), strict=True):
+        assert_array_equal(a, b)
+    reports = [{key: value for key, value in x.report.items() if key != "seconds"} for x in (one, other)]
+    assert str(reports[0]) == str(reports[1])
+
+
+def test_an_analysis_gives_what_unwrap_gives(blob):
+    analysis = native.analyse(*blob)
+    assert not analysis.weld and repr(analysis) == "Analysis(faces=1536, weld=False)"
+    for settings in (
+        {},
+        {"stretch_limit": 1.02},
+        {"stretch_limit": 1.3},
+        {"stretch_limit": 1.05, "limit_over": "atlas"},
+        {"stretch_limit": 1.05, "margin": 8, "seed": 2, "threads": 1},
+        {"stretch_limit": 1.02, "model": "isomap"},
+        {"stretch_limit": 1.02},
+    ):
+        same(analysis.unwrap(**QUICK | settings), unwrap(*blob, **settings))
+
+
+def test_an_analysis_keeps_marks_and_welding(ball):
+    positions, corners, offsets = ball
+    marks = sides(ball, np.isclose(positions[:, 2], positions[:, 2].round(9)[100]))
+    split = positions[corners], np.arange(len(corners), dtype=np.int32), offsets
+    analysis = native.analyse(*split, weld=True)
+    assert analysis.weld
+    same(analysis.unwrap(**QUICK), unwrap(*split, weld=True))
+    with pytest.raises(native.InvalidArgumentError, match="weld is false; it must be true, as in the analysis"):
+        analysis.unwrap(weld=False)
+    for name in ("seams", "guides"):
+        given = {name: marks}
+        same(native.analyse(*ball, **given).unwrap(**QUICK), unwrap(*ball, **given))
+
+
+def test_wrong_arguments_of_an_analysis_are_named(square):
+    with pytest.raises(native.InvalidArgumentError, match=r"analyse\(\) has no setting 'stretch_limit'"):
+        native.analyse(*square, stretch_limit=1.1)
+    with pytest.raises(native.InvalidArgumentError, match="positions: expected"):
+        native.analyse(None, *square[1:])
+    with pytest.raises(native.InvalidMeshError, match="corner 0"):
+        native.analyse(square[0], square[1] + 40, square[2])
+    analysis = native.analyse(*square)
+    with pytest.raises(native.InvalidArgumentError, match="stretch_limit"):
+        analysis.unwrap(stretch_limit=1.0)
+    with pytest.raises(native.InvalidArgumentError, match="job: expected a new Job"):
+        job = native.Job()
+        native.analyse(*square, job=job)
+        analysis.unwrap(job=job)
+    with pytest.raises(TypeError):
+        native.Analysis()
+
+
+def test_an_analysis_serves_several_threads_and_jobs(blob):
+    analysis = native.analyse(*blob)
+    limits = [1.02, 1.1, 1.05, 1.02]
+    jobs = [analysis.submit_unwrap(**QUICK, stretch_limit=limit) for limit in limits]
+    del analysis
+    gc.collect()  # the jobs keep what they need
+    expected = {limit: unwrap(*blob, stretch_limit=limit) for limit in set(limits)}
+    for limit, job in zip(limits, jobs, strict=True):
+        same(job.result(), expected[limit])
+
+    analysis = native.analyse(*blob)
+    found = {}
+
+    def run(limit):
+        found[limit] = analysis.unwrap(**QUICK, stretch_limit=limit)
+
+    threads = [threading.Thread(target=run, args=(limit,)) for limit in expected]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for limit, atlas in found.items():
+        same(atlas, expected[limit])
+
+
+def test_a_cancelled_call_leaves_the_analysis_good(large_ball):
+    analysis = native.analyse(*large_ball)
+    job = analysis.submit_unwrap(**QUICK)
+    job.cancel()
+    with pytest.raises(native.Cancelled):
+        job.result()
+    same(analysis.unwrap(**QUICK), submit(*large_ball).result())
+    job = native.Job()
+    job.cancel()
+    with pytest.raises(native.Cancelled):
+        native.analyse(*large_ball, job=job)
