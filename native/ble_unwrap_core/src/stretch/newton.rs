@@ -39,7 +39,7 @@ const APART_TOLERANCE: f64 = 10.0;
 
 /// A triangle of more than this squared stretch is among the worst,
 const WORST: f64 = 3.0;
-/// which are mended first if they are at most this share of all,
+/// which are mended first, and last, if they are at most this share of all,
 const MOST_WORST: f64 = 0.05;
 /// so many rings around them,
 const WORST_RINGS: usize = 4;
@@ -106,8 +106,18 @@ pub(super) fn minimise(
             }
         }
     }
-    result.l2 = l2;
     result.uv = descent.uv;
+    result.l2 = l2;
+    if !result.abandoned {
+        let mut relaxed = result.uv.clone();
+        relax_worst(mesh, rest, &mut relaxed, &warm, options.keep_apart.is_some(), progress)?;
+        let l2 = descent.system.stretch_sums(&relaxed).l2();
+        // The average has converged long before a few small triangles have.
+        if l2 <= result.l2 {
+            result.uv = relaxed;
+            result.l2 = l2;
+        }
+    }
     Ok(result)
 }
 
@@ -129,18 +139,25 @@ fn relax_worst(
         return Ok(());
     }
     let near = Neighbourhood::new(mesh, rest, &bad, WORST_RINGS);
-    let mut descent = Descent::new(&near.mesh, &near.rest, near.read(uv), near.pinned.clone(), None)?;
-    for _ in 0..WORST_STEPS {
-        progress.check()?;
-        let Some((before, after)) = descent.step(&near.mesh, energy) else { break };
-        if before - after <= WORST_TOLERANCE * after {
+    let border: Vec<bool> =
+        near.mesh.vertices().map(|v| near.pinned[v.index()] || near.mesh.is_boundary_vertex(v)).collect();
+    // Where a border that moves would run over another it stays.
+    let pins = if keep_apart { vec![&near.pinned, &border] } else { vec![&near.pinned] };
+    for pinned in pins {
+        let mut descent = Descent::new(&near.mesh, &near.rest, near.read(uv), pinned.clone(), None)?;
+        for _ in 0..WORST_STEPS {
+            progress.check()?;
+            let Some((before, after)) = descent.step(&near.mesh, energy) else { break };
+            if before - after <= WORST_TOLERANCE * after {
+                break;
+            }
+        }
+        let mut relaxed = uv.to_vec();
+        near.write(&descent.uv, &mut relaxed);
+        if first_flip(mesh, &relaxed).is_none() && (!keep_apart || boundary_is_simple(mesh, &relaxed)) {
+            uv.copy_from_slice(&relaxed);
             break;
         }
-    }
-    let mut relaxed = uv.to_vec();
-    near.write(&descent.uv, &mut relaxed);
-    if first_flip(mesh, &relaxed).is_none() && (!keep_apart || boundary_is_simple(mesh, &relaxed)) {
-        uv.copy_from_slice(&relaxed);
     }
     Ok(())
 }
