@@ -182,7 +182,8 @@ def test_the_interpreter_may_end_while_a_job_runs():
 
 def test_ctrl_c_interrupts():
     code = """
-import _thread, threading, time, conftest, ble_unwrap_native as n
+import _thread, signal, threading, time, conftest, ble_unwrap_native as n
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background of a shell
 job = n.Job()
 mesh = conftest.sphere(768, 768)
 

@@ -64,7 +64,7 @@ pub(super) fn sew(
     progress: &memo::Run<'_>,
 ) -> Result<(Vec<Sewn>, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
-    let most_faces = if settings.least_sewn < NEVER_SEWN { most_faces } else { 0 };
+    let most_faces = if settings.merge && settings.least_sewn < NEVER_SEWN { most_faces } else { 0 };
     let whole = |(i, chart)| Some(Piece::new(Sewn { chart, pieces: vec![i], edges: Vec::new() }));
     let pool: Vec<Option<Piece>> = charts.into_iter().enumerate().map(whole).collect();
     let mut table =
