@@ -39,7 +39,7 @@ static ROWS: [Row; 17] = [
     row("Moebius strip", [1, 1], 1.001, 0.34, 0.15),
     row("Klein bottle", [1, 1], 1.04, 1.90, 0.55),
     row("face", [1, 1], 1.04, 0.0, 0.73),
-    row("small sculpt", [2, 9], 1.1, 5.37, 0.43),
+    row("small sculpt", [2, 8], 1.1, 5.8, 0.6),
 ];
 
 #[test]
