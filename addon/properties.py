@@ -21,6 +21,7 @@ PAPER_VALUES = {
     "together_max": 2000,
     "holes": "CUT",
     "coarse": False,
+    "least_sewn": 1000.0,
     "stretch_solver": "LINE_SEARCH",
     "stretch_iterations": 60,
     "margin": 2.0,
@@ -200,6 +201,19 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         ),
         default="UNIFORM",
     )
+    least_sewn: FloatProperty(
+        name="Least Sewn",
+        description=(
+            "Charts are sewn along a part of their border, the rest left open, if that part is this long beside the "
+            "width of the smaller one. Less gives fewer charts, more gives compact ones, 1000 sews none"
+        ),
+        default=0.2,
+        min=0.0,
+        max=1000.0,
+        soft_max=2.0,
+        step=10,
+        precision=2,
+    )
     crease_weight: FloatProperty(
         name="Crease Weight",
         description="How strongly borders are drawn to folds of the surface; 0 looks at their length alone",
@@ -370,7 +384,8 @@ BRIDGE_SETTINGS = (
 # What means something for surfaces only, or for clouds only; the other one's functions do not take it.
 SURFACE_SETTINGS = (
     *("use_seams", "follow_seams", "follow_sharp", "follow_materials", "mark_seams"),
-    *("limit_over", "weld", "merge", "holes", "chart_scale", "crease_weight", "geodesics"),
+    *("limit_over", "weld", "merge", "least_sewn", "holes", "chart_scale"),
+    *("crease_weight", "geodesics"),
     *("together_max", "stretch_solver", "stretch_iterations"),
 )
 CLOUD_SETTINGS = ("neighbours",)
@@ -380,7 +395,7 @@ MAIN_SETTINGS = ("stretch_limit", "texture_size", "margin", "rotation", "use_sea
 ADVANCED_SETTINGS = (
     ("Result", ("uv_map", "uv_map_name", "use_original_bounds", "mark_seams")),
     ("Borders", ("follow_seams", "follow_sharp", "follow_materials", "crease_weight")),
-    ("Charts", ("limit_over", "neighbours", "weld", "coarse", "merge", "holes", "chart_scale", "seed")),
+    ("Charts", ("limit_over", "neighbours", "weld", "coarse", "merge", "least_sewn", "holes", "chart_scale", "seed")),
     ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max", "together_max")),
     ("Embedding", ("model", "kernel_width", "relaxation", "max_sweeps", "tolerance", "update", "initial")),
     ("Stretch", ("stretch_solver", "stretch_iterations")),
