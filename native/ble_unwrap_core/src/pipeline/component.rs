@@ -39,8 +39,7 @@ const COARSE_ALLOWANCE: f64 = 0.6;
 /// ratio of one vertex in twenty.
 const BAND_RINGS: usize = 10;
 /// On the fine mesh only charts that a split there has made are joined again, and only up to so many faces: the
-/// others have been tried on the coarse mesh, and a trial costs what flattening them did. On a body with fingers
-/// and ears 1,200 instead of 6,000 saves a quarter of the time and costs 5 % more charts.
+/// others have been tried on the coarse mesh. With 1,200 a cat kept 17 charts of parts that had been split, with this 4.
 const FINE_UNION: usize = 20_000;
 /// A part that is over the limit is split on the coarse mesh only while it has more faces there than this, and
 const LEAST_COARSE_FACES: usize = 60;

@@ -227,3 +227,52 @@ fn spread_shift(mesh: &TriMesh, places: &[Option<Point2<f64>>], middle: &[Option
     }
     shift
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Progress;
+    use crate::mesh::test_surfaces;
+
+    /// The faces of a square sheet with their middle in x between two bounds, drawn in the plane turned by some angle.
+    fn part(mesh: &TriMesh, from: f64, to: f64, angle: f64) -> Chart {
+        let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
+        let middle = |f: &FaceId| mesh.triangle_positions(*f).iter().map(|p| p.x).sum::<f64>() / 3.0;
+        let patch =
+            Patch::of_surface(mesh, &polygon, mesh.faces().filter(|f| (from..to).contains(&middle(f))).collect());
+        let turn = Rotation2::new(angle);
+        let uv = patch.mesh.positions().iter().map(|p| turn * p.xy() + Vector2::new(3.0 * angle, 5.0)).collect();
+        Chart { patch, uv, l2: 1.0 }
+    }
+
+    fn join(mesh: &TriMesh, charts: [&Chart; 2]) -> Option<Chart> {
+        let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
+        let progress = Progress::new();
+        let run = Run::new(&progress, None);
+        joined(mesh, &polygon, charts, &Settings::default(), &mut Rungs::default(), &run).expect("not cancelled")
+    }
+
+    #[test]
+    fn halves_of_a_sheet_meet_whatever_their_pose() {
+        let mesh = test_surfaces::grid(12, 12, [1.0, 1.0], 0.0);
+        let (left, right) = (part(&mesh, -1.0, 0.5, 0.0), part(&mesh, 0.5, 2.0, 2.3));
+        let sides = Sides { mesh: &mesh, a: Side::new(&left), b: Side::new(&right) };
+        let stretches = sides.stretches();
+        assert_eq!((stretches.len(), stretches[0].len()), (1, 12));
+        let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
+        let patch = sides.union(&polygon, &stretches[0]);
+        let start = sides.start(&patch, &stretches[0]);
+        for h in patch.mesh.halfedges() {
+            let laid = (start[patch.mesh.from(h).index()] - start[patch.mesh.to(h).index()]).norm();
+            assert!((laid - patch.mesh.edge_length(h)).abs() < 1e-12, "an isometry: nothing is left to share");
+        }
+        let whole = join(&mesh, [&left, &right]).expect("one chart");
+        assert!(whole.l2 < 1.0 + 1e-9 && whole.patch.faces.len() == mesh.face_count());
+    }
+
+    #[test]
+    fn charts_that_do_not_touch_are_not_joined() {
+        let mesh = test_surfaces::grid(12, 12, [1.0, 1.0], 0.0);
+        assert!(join(&mesh, [&part(&mesh, -1.0, 0.25, 0.0), &part(&mesh, 0.75, 2.0, 1.0)]).is_none());
+    }
+}
