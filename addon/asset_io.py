@@ -32,7 +32,21 @@ def default_output_format(path):
 
 def new_scene():
     """An empty scene with factory settings; enabled add-ons stay."""
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    _replace_scene(lambda: bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True))
+
+
+def _replace_scene(operator):
+    """Runs an operator that frees the scene, and leaves nothing behind that names the one freed.
+
+    Before Blender 5, whoever reads `bpy.context.tool_settings` makes the scene the owner of `bpy.context` itself, even
+    when the scene is gone: the next property set through the context, as the glTF exporter sets the window's scene,
+    then tags freed memory. Reading the settings anew names the scene that is there now.
+    """
+    owned = bpy.context.id_data is not None
+    done = operator()
+    if owned:
+        _ = bpy.context.tool_settings
+    return done
 
 
 def load(path):
@@ -45,7 +59,7 @@ def load(path):
         raise AssetError("no such file")
     try:
         if kind == "blend":
-            done = bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
+            done = _replace_scene(lambda: bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False))
         else:
             new_scene()
             done = _import(path, kind)

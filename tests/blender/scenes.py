@@ -54,7 +54,7 @@ def edit(*objects, faces=None):
         mesh.edges.foreach_set("select", np.zeros(len(mesh.edges), bool))
         mesh.polygons.foreach_set("select", np.isin(np.arange(len(mesh.polygons)), faces))
         bpy.ops.object.mode_set(mode="EDIT")
-        bpy.context.tool_settings.mesh_select_mode = (False, False, True)
+        bpy.context.scene.tool_settings.mesh_select_mode = (False, False, True)
 
 
 def uvs(obj, name=None):

@@ -44,7 +44,7 @@ def select_points(obj, chosen):
     if obj.type == "MESH":
         obj.data.vertices.foreach_set("select", chosen)
         bpy.ops.object.mode_set(mode="EDIT")
-        bpy.context.tool_settings.mesh_select_mode = (True, False, False)
+        bpy.context.scene.tool_settings.mesh_select_mode = (True, False, False)
         return
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.pointcloud.select_all(action="SELECT")
@@ -346,7 +346,7 @@ def test_surface_and_cloud_in_edit_mode_together(addon):
     surface.data.polygons.foreach_set("select", np.zeros(6, bool))
     surface.data.vertices.foreach_set("select", np.zeros(8, bool))
     loose.data.vertices.foreach_set("select", np.ones(400, bool))
-    bpy.context.tool_settings.mesh_select_mode = (True, False, False)
+    bpy.context.scene.tool_settings.mesh_select_mode = (True, False, False)
     bpy.ops.object.mode_set(mode="EDIT")
     assert unwrap() == {"FINISHED"}, "no face is selected, but points are"
     bpy.ops.object.mode_set(mode="OBJECT")

@@ -5,7 +5,9 @@ import os
 import struct
 import sys
 import zlib
+from pathlib import Path
 
+import addon_loader
 import bpy
 import numpy as np
 import pytest
@@ -57,6 +59,25 @@ def test_formats(run_script, files, tmp_path, addon, name):
     assert sum(len(obj.data.polygons) for obj in objects) in (25, 50)
     assert_good(objects[0])
     assert not list((tmp_path / "out").glob(".*")), "no temporary files are left"
+
+
+@pytest.mark.parametrize("name", ["a.obj", "a.blend"])
+def test_context_names_no_freed_scene_after_a_load(run_script, files, tmp_path, name):
+    """Else the glTF exporter, which sets a property through the context, may crash Blender. In a process of its own:
+    the owner that is noted here would outlive this test's scene."""
+    grid(3)
+    source = files(name)
+    script = tmp_path / "load.py"
+    script.write_text(
+        f"import sys; sys.path.insert(0, {str(Path(addon_loader.__file__).parent)!r})\n"
+        "import addon_loader, bpy\n"
+        "asset_io = addon_loader.load('asset_io')\n"
+        "_ = bpy.context.tool_settings  # in Blender 4.2 this makes the scene the owner of the context\n"
+        f"asset_io.load({str(source)!r})\n"
+        "addon_loader.leave(0 if bpy.context.id_data in (None, bpy.context.scene) else 5)\n"
+    )
+    done = run_script(script)
+    assert done.returncode == 0, done.stdout
 
 
 def test_split_glb_is_charted_across_its_seams(run_script, files, tmp_path):
