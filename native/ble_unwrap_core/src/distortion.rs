@@ -74,6 +74,17 @@ impl RestTriangle {
         [Point2::new(0.0, 0.0), Point2::new(self.x1, 0.0), Point2::new(self.x2, self.y2)]
     }
 
+    /// Cotangents of the angles opposite the three sides, in the order of the half-edges.
+    #[must_use]
+    pub fn cotangents(&self) -> [f64; 3] {
+        let c = self.corners();
+        [0, 1, 2].map(|k| {
+            let apex = c[(k + 2) % 3];
+            let (a, b) = (c[k] - apex, c[(k + 1) % 3] - apex);
+            a.dot(&b) / a.perp(&b)
+        })
+    }
+
     /// Jacobian of the affine map that takes this triangle to `uv`.
     #[inline]
     #[must_use]
@@ -116,6 +127,12 @@ pub fn signed_double_area(uv: [Point2<f64>; 3]) -> f64 {
 mod tests {
     use super::*;
     use nalgebra::Rotation2;
+
+    #[test]
+    fn cotangents_of_half_a_square() {
+        let got = RestTriangle { x1: 1.0, x2: 1.0, y2: 1.0 }.cotangents();
+        assert!(got.iter().zip([1.0, 1.0, 0.0]).all(|(a, b)| (a - b).abs() < 1e-15), "{got:?}");
+    }
 
     #[test]
     fn singular_values_of_a_known_map() {

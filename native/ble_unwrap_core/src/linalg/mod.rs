@@ -6,10 +6,12 @@
 mod classical_mds;
 mod krylov;
 mod sparse;
+mod sparse_pattern;
 mod symmetric;
 mod vector_state;
 
 pub use classical_mds::{Mds, classical_mds, leading_mds};
-pub use sparse::{SparseCholesky, SparseError, SparsePattern};
+pub use sparse::{RoughCholesky, SparseCholesky, SparseError};
+pub use sparse_pattern::SparsePattern;
 pub use symmetric::{EigenError, Eigenpairs, leading_eigenpairs};
 pub use vector_state::restore_vector_state;

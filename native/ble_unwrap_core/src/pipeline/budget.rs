@@ -12,7 +12,7 @@ use crate::settings::Settings;
 
 use super::memo::Run;
 use super::rungs::{Rung, Rungs};
-use super::sew;
+use super::sew::{self, Joined};
 
 /// Share of the budget that is left for rounding to single precision.
 const RESERVE: f64 = 1e-4;
@@ -144,10 +144,9 @@ impl<'a> Pool<'a> {
             }
             let sides = [&a.chart, &b.chart];
             let union = sew::joined(self.mesh, self.polygon, sides, &settings, &mut Rungs::default(), progress)?;
-            Ok(union.map(|chart| {
-                let added = (a.area + b.area) * chart.l2 * chart.l2 - a.stretch - b.stretch;
-                Union { pair, chart, added, price: added / saved.max(f64::MIN_POSITIVE) }
-            }))
+            let Joined::Chart(chart) = union else { return Ok(None) };
+            let added = (a.area + b.area) * chart.l2 * chart.l2 - a.stretch - b.stretch;
+            Ok(Some(Union { pair, chart: *chart, added, price: added / saved.max(f64::MIN_POSITIVE) }))
         };
         let offers: Vec<Result<Option<Union>, Cancelled>> = pairs.into_par_iter().with_max_len(1).map(offer).collect();
         offers.into_iter().filter_map(Result::transpose).collect()

@@ -136,6 +136,16 @@ pub(super) fn split(
     Attempt::new(patch, None, settings, progress).split(1, rungs)
 }
 
+/// A patch as one chart, cut open where its topology asks for it; `None` where that is over the limit.
+pub(super) fn as_one(
+    patch: &Patch,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Run<'_>,
+) -> Result<Option<Chart>, Cancelled> {
+    Attempt::new(patch, None, settings, progress).run(rungs)
+}
+
 /// One patch under trial: its topology, and its distances once somebody asks.
 struct Attempt<'a> {
     patch: &'a Patch,

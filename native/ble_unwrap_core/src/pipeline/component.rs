@@ -16,9 +16,10 @@ use crate::progress::Cancelled;
 use crate::segmentation::{self, Segmentation};
 use crate::settings::Settings;
 
+use super::carry::carried_over;
 use super::charting::{self, Charting};
 use super::darts::{self, Sewn};
-use super::flatten;
+use super::flatten::{self, Polished};
 use super::memo::{self, Fingerprint, Kind, Run};
 use super::merge::{self, Which};
 use super::prolong::{Prolonged, prolong};
@@ -35,11 +36,13 @@ const COARSE_VERTICES: (usize, usize) = (1_500, 20_000);
 /// On the coarse mesh the stretch above 1 must stay under this share of what the limit allows: detail
 /// that the collapse removed adds some.
 const COARSE_ALLOWANCE: f64 = 0.6;
+/// A flattening there only has to tell whether the limit is kept, and where to begin: it may end so many times sooner.
+const COARSE_TOLERANCE: f64 = 10.0;
 /// Sides by which a border may move on the fine mesh: about two edges of the coarse one at the usual
 /// ratio of one vertex in twenty.
 const BAND_RINGS: usize = 10;
 /// On the fine mesh only charts that a split there has made are joined again, and only up to so many faces: the
-/// others have been tried on the coarse mesh. With 1,200 a cat kept 17 charts of parts that had been split, with this 4.
+/// others have been tried on the coarse mesh.
 const FINE_UNION: usize = 20_000;
 /// A part that is over the limit is split on the coarse mesh only while it has more faces there than this, and
 const LEAST_COARSE_FACES: usize = 60;
@@ -108,7 +111,7 @@ impl Whole {
         rungs: &mut Rungs,
         progress: &Run<'_>,
     ) -> Result<Vec<Sewn>, Cancelled> {
-        let (sewn, steps) = darts::sew(&self.patch.mesh, &self.patch.polygon, charts, usize::MAX, settings, progress)?;
+        let (sewn, steps) = darts::sew(&self.patch.mesh, &self.patch.polygon, charts, settings, progress)?;
         rungs.add(&steps);
         Ok(sewn)
     }
@@ -185,6 +188,7 @@ impl<'a> OnCoarse<'a> {
         let whole = Whole::new(coarse.mesh.clone(), polygon);
         let mut strict = settings.clone();
         strict.stretch_limit = 1.0 + COARSE_ALLOWANCE * (settings.stretch_limit - 1.0);
+        strict.stretch.tolerance *= COARSE_TOLERANCE;
         Ok(Self { fine, whole, coarse, settings, strict })
     }
 
@@ -209,7 +213,7 @@ impl<'a> OnCoarse<'a> {
             let pieces: Vec<Part> = rest.iter_mut().filter(|p| mine(p)).filter_map(Option::take).collect();
             let (coarse, fine) = (&self.coarse.mesh, &self.fine.patch);
             let patches: Vec<(&Patch, &Chart)> = pieces.iter().map(|p| (&p.patch, &p.guide)).collect();
-            match darts::carried_over(coarse, &fine.mesh, &fine.polygon, &patches, &sewn) {
+            match carried_over(coarse, &fine.mesh, &fine.polygon, &patches, &sewn) {
                 Some(patch) => joined.push(Part { patch, guide: sewn.chart, number: usize::MAX, pieces, family: None }),
                 None => joined.extend(pieces),
             }
@@ -317,7 +321,8 @@ impl<'a> OnCoarse<'a> {
         progress.check()?;
         let done = |h: HalfedgeId| part.is_border(&self.coarse.mesh, h);
         if let Some(Prolonged { patch, start }) = prolong(&self.coarse, &part.guide, &part.patch, done)
-            && let Some(flat) = flatten::polish(&patch, &start, Rung::Prolonged, self.settings, rungs, progress)?
+            && let Polished::Flat(flat) =
+                flatten::polish(&patch, &start, Rung::Prolonged, self.settings, rungs, progress)?
         {
             return Ok(Outcome::Accept(Box::new(flat.into_chart(patch))));
         }

@@ -6,26 +6,26 @@
 //! makes was one before, so nothing gets longer. From the two maps so joined the stretch is minimised as ever, and that
 //! is the judge.
 
-use nalgebra::{Complex, Point2, Point3};
+use nalgebra::{Complex, Point2};
 use rayon::prelude::*;
 
 use crate::charts::{Chart, Patch};
-use crate::mesh::{DisjointSets, FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::distortion::RestTriangle;
+use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::progress::Cancelled;
 use crate::settings::{NEVER_SEWN, Settings};
+use crate::stretch;
 
-use super::flatten;
+use super::flatten::{self, Polished};
 use super::memo;
+use super::rigid::{Motion, longest_fit};
 use super::rungs::{Rung, Rungs};
-use super::sew;
 
 /// Charts are sewn where their borders fit, by a rigid motion, up to this share (root of mean square over length) of the
 /// length that is sewn: a straight border and an arc of 120°. If that is over the limit, once more where they fit closer.
 const FITS: [f64; 2] = [0.08, 0.03];
 /// Failed trials a chart may take part in before it is left alone.
 const MOST_FAILURES: usize = 3;
-/// Longer stretches of border are looked at in so many places only.
-const MOST_PLACES: usize = 256;
 
 /// Charts that have become one.
 #[derive(Clone, Debug)]
@@ -52,27 +52,24 @@ impl Piece {
     }
 }
 
-/// Sews charts together, longest seam first, where they fit and stay under the limit; unions have at most `most_faces`
-/// faces. The charts are made of faces of `mesh`. Sorted by lowest face. Each chart takes part in at most [`MOST_FAILURES`]
+/// Sews charts together, longest seam first, where they fit and stay under the limit. The charts are made of faces of `mesh`. Sorted by lowest face. Each chart takes part in at most [`MOST_FAILURES`]
 /// failed trials, so the number of trials is linear in the number of charts.
 pub(super) fn sew(
     mesh: &TriMesh,
     polygon: &[u32],
     charts: Vec<Chart>,
-    most_faces: usize,
     settings: &Settings,
     progress: &memo::Run<'_>,
 ) -> Result<(Vec<Sewn>, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
-    let most_faces = if settings.merge && settings.least_sewn < NEVER_SEWN { most_faces } else { 0 };
     let whole = |(i, chart)| Some(Piece::new(Sewn { chart, pieces: vec![i], edges: Vec::new() }));
     let pool: Vec<Option<Piece>> = charts.into_iter().enumerate().map(whole).collect();
     let mut table =
         Table { mesh, polygon, owner: vec![(usize::MAX, 0); mesh.face_count()], pool, least_sewn: settings.least_sewn };
     (0..table.pool.len()).for_each(|i| table.claim(i));
-    loop {
+    while settings.merge && settings.least_sewn < NEVER_SEWN {
         progress.check()?;
-        let seams = table.independent_seams(most_faces);
+        let seams = table.independent_seams();
         if seams.is_empty() {
             break;
         }
@@ -82,9 +79,13 @@ pub(super) fn sew(
             .map(|seam| {
                 let mut rungs = Rungs::default();
                 let (patch, start) = table.joined(seam);
-                let chart = if patch.mesh.topology().is_chart() {
-                    let flat = flatten::polish(&patch, &start, Rung::Sewn, settings, &mut rungs, progress)?;
-                    flat.map(|flat| flat.into_chart(patch))
+                let chart = if patch.mesh.topology().is_chart()
+                    && let Some(start) = start
+                {
+                    match flatten::polish(&patch, &start, Rung::Sewn, settings, &mut rungs, progress)? {
+                        Polished::Flat(flat) => Some(flat.into_chart(patch)),
+                        Polished::Refused | Polished::BadStart => None,
+                    }
                 } else {
                     None
                 };
@@ -117,20 +118,6 @@ struct Seam {
     edges: Vec<HalfedgeId>,
     length: f64,
     motion: Motion,
-}
-
-/// x ↦ turn·x + shift, a rigid motion of the plane.
-#[derive(Clone, Copy, Debug)]
-struct Motion {
-    turn: Complex<f64>,
-    shift: Complex<f64>,
-}
-
-impl Motion {
-    fn apply(&self, p: Point2<f64>) -> Point2<f64> {
-        let moved = self.turn * Complex::new(p.x, p.y) + self.shift;
-        Point2::new(moved.re, moved.im)
-    }
 }
 
 struct Table<'a> {
@@ -169,12 +156,12 @@ impl Table<'_> {
     }
 
     /// Seams worth a trial, of which no two share a piece, longest first.
-    fn independent_seams(&self, most_faces: usize) -> Vec<Seam> {
+    fn independent_seams(&self) -> Vec<Seam> {
         let mut seams: Vec<Seam> = Vec::new();
         for (i, piece) in self.pool.iter().enumerate() {
             let Some(piece) = piece else { continue };
             if piece.failures < MOST_FAILURES {
-                seams.extend(self.runs(i, most_faces).into_iter().filter_map(|run| self.seam(&run)));
+                seams.extend(self.runs(i).into_iter().filter_map(|run| self.seam(&run)));
             }
         }
         let order = |a: &Seam, b: &Seam| b.length.total_cmp(&a.length).then_with(|| a.edges[0].cmp(&b.edges[0]));
@@ -191,7 +178,7 @@ impl Table<'_> {
     }
 
     /// The stretches of border that a piece shares with another of higher number.
-    fn runs(&self, i: usize, most_faces: usize) -> Vec<Run> {
+    fn runs(&self, i: usize) -> Vec<Run> {
         let Some(chart) = self.chart(i) else { return Vec::new() };
         let (patch, mesh) = (&chart.patch, self.mesh);
         let beyond = |h: HalfedgeId| {
@@ -201,8 +188,7 @@ impl Table<'_> {
                 return None;
             }
             let piece = self.pool[other].as_ref()?;
-            let faces = piece.sewn.chart.patch.faces.len() + patch.faces.len();
-            (piece.failures < MOST_FAILURES && faces <= most_faces).then_some(other)
+            (piece.failures < MOST_FAILURES).then_some(other)
         };
         // On the other side the border runs on without a third chart or a cut between.
         let runs_on = |g: HalfedgeId, h: HalfedgeId| {
@@ -264,7 +250,7 @@ impl Table<'_> {
     }
 
     /// The union of two pieces, glued along a seam, and the two maps laid together.
-    fn joined(&self, seam: &Seam) -> (Patch, Vec<Point2<f64>>) {
+    fn joined(&self, seam: &Seam) -> (Patch, Option<Vec<Point2<f64>>>) {
         let mesh = self.mesh;
         let mut faces: Vec<FaceId> =
             seam.pieces.iter().filter_map(|&i| self.chart(i)).flat_map(|c| c.patch.faces.iter().copied()).collect();
@@ -280,16 +266,12 @@ impl Table<'_> {
             }
         };
         let (part, vertices) = mesh.submesh(&faces, is_cut);
-        let n = part.vertex_count();
-        let mut places = [vec![None; n], vec![None; n]];
-        for (i, f) in faces.iter().enumerate() {
-            let side = usize::from(self.owner[f.index()].0 == seam.pieces[1]);
-            for (h, v) in f.halfedges().into_iter().zip(part.triangle(FaceId::new(i))) {
-                let p = self.place(h);
-                places[side][v.index()] = Some(if side == 1 { seam.motion.apply(p) } else { p });
-            }
-        }
-        let start = sew::met(&part, &places);
+        let draw = |f: &FaceId| {
+            let place = f.halfedges().map(|h| self.place(h));
+            if self.owner[f.index()].0 == seam.pieces[1] { place.map(|p| seam.motion.apply(p)) } else { place }
+        };
+        let drawn: Vec<[Point2<f64>; 3]> = faces.iter().map(draw).collect();
+        let start = stretch::stitch(&part, &RestTriangle::of_mesh(&part), &drawn).ok();
         let polygon = faces.iter().map(|f| self.polygon[f.index()]).collect();
         (Patch { mesh: part, vertices, polygon, faces }, start)
     }
@@ -326,159 +308,14 @@ struct Run {
     most_edges: usize,
 }
 
-struct Window {
-    first: usize,
-    last: usize,
-    length: f64,
-    motion: Motion,
-}
-
-/// The longest stretch over which a rigid motion takes the second of each pair of points to the first, up to `fit`
-/// (root of mean square over length). Looks at O(m²) stretches between m ≤ [`MOST_PLACES`] places, each in O(1) by sums
-/// that have been taken before.
-fn longest_fit(points: &[[Complex<f64>; 2]], lengths: &[f64], most_edges: usize, fit: f64) -> Option<Window> {
-    #[derive(Clone, Copy, Default)]
-    struct Sums {
-        a: Complex<f64>,
-        b: Complex<f64>,
-        squares: f64,
-        product: Complex<f64>,
-        length: f64,
-    }
-    let mut sums = vec![Sums::default()];
-    for (k, [a, b]) in points.iter().enumerate() {
-        let s = sums[k];
-        sums.push(Sums {
-            a: s.a + a,
-            b: s.b + b,
-            squares: s.squares + a.norm_sqr() + b.norm_sqr(),
-            product: s.product + a * b.conj(),
-            // Up to point k.
-            length: s.length + if k > 0 { lengths[k - 1] } else { 0.0 },
-        });
-    }
-    let n = points.len();
-    let stride = n.div_ceil(MOST_PLACES).max(1);
-    let mut best: Option<Window> = None;
-    for first in (0..n).step_by(stride) {
-        for last in (first + 1..n.min(first + most_edges + 1)).rev() {
-            let length = sums[last + 1].length - sums[first + 1].length;
-            if best.as_ref().is_some_and(|b| length <= b.length) {
-                break;
-            }
-            if (last - first) % stride != 0 {
-                continue;
-            }
-            let (from, to) = (&sums[first], &sums[last + 1]);
-            let count = (last + 1 - first) as f64;
-            let (a, b) = (to.a - from.a, to.b - from.b);
-            let covariance = to.product - from.product - a * b.conj() / count;
-            let squares = to.squares - from.squares - (a.norm_sqr() + b.norm_sqr()) / count;
-            let error = ((squares - 2.0 * covariance.norm()) / count).max(0.0).sqrt();
-            if error <= fit * length && covariance.norm() > 0.0 {
-                let turn = covariance / covariance.norm();
-                best = Some(Window { first, last, length, motion: Motion { turn, shift: (a - turn * b) / count } });
-                break;
-            }
-        }
-    }
-    best
-}
-
-/// The union of parts of a fine mesh whose guides, charts of a coarse one, have been sewn: cut along the borders between
-/// the parts but where the nearest edge of the coarse border is sewn. `None` where they do not hang together.
-/// O(n log n) and a look at each coarse edge of a border for each fine one.
-pub(super) fn carried_over(
-    coarse: &TriMesh,
-    fine: &TriMesh,
-    polygon: &[u32],
-    pieces: &[(&Patch, &Chart)],
-    sewn: &Sewn,
-) -> Option<Patch> {
-    let owners = |count: usize, faces: &dyn Fn(usize) -> Vec<FaceId>| {
-        let mut owner = vec![usize::MAX; count];
-        for i in 0..pieces.len() {
-            for f in faces(i) {
-                owner[f.index()] = i;
-            }
-        }
-        owner
-    };
-    let guide = owners(coarse.face_count(), &|i| pieces[i].1.patch.faces.clone());
-    let part = owners(fine.face_count(), &|i| pieces[i].0.faces.clone());
-    let coarse_borders = borders(coarse, &guide);
-    let mut edges: Vec<HalfedgeId> = sewn.edges.iter().flat_map(|&h| [h, coarse.twin(h)]).collect();
-    edges.sort_unstable();
-    let mut glued: Vec<HalfedgeId> = Vec::new();
-    for border in borders(fine, &part).chunk_by(|x, y| x.0 == y.0) {
-        let from = coarse_borders.partition_point(|b| b.0 < border[0].0);
-        let to = coarse_borders.partition_point(|b| b.0 <= border[0].0);
-        let is_sewn = |h: HalfedgeId| {
-            let to_edge = |&(_, g): &(_, HalfedgeId)| (middle(coarse, g) - middle(fine, h)).norm_squared();
-            let nearest = coarse_borders[from..to].iter().min_by(|x, y| to_edge(x).total_cmp(&to_edge(y)));
-            nearest.is_some_and(|b| edges.binary_search(&b.1).is_ok())
-        };
-        let candidates: Vec<HalfedgeId> = border.iter().map(|b| b.1).filter(|&h| is_sewn(h)).collect();
-        glued.extend(longest_chain(fine, &candidates));
-    }
-    glued = glued.iter().flat_map(|&h| [h, fine.twin(h)]).collect();
-    glued.sort_unstable();
-    let mut faces: Vec<FaceId> = pieces.iter().flat_map(|p| p.0.faces.iter().copied()).collect();
-    faces.sort_unstable();
-    let is_cut = |h: HalfedgeId| {
-        let [a, b] = [h, fine.twin(h)].map(|h| part[h.face().index()]);
-        a != b && glued.binary_search(&h).is_err()
-    };
-    let (mesh, vertices) = fine.submesh(&faces, is_cut);
-    let polygon = faces.iter().map(|f| polygon[f.index()]).collect();
-    (mesh.components().1 == 1).then_some(Patch { mesh, vertices, polygon, faces })
-}
-
-fn middle(mesh: &TriMesh, h: HalfedgeId) -> Point3<f64> {
-    nalgebra::center(&mesh.position(mesh.from(h)), &mesh.position(mesh.to(h)))
-}
-
-/// The edges between different owners, each once, sorted by their pair.
-fn borders(mesh: &TriMesh, owner: &[usize]) -> Vec<([usize; 2], HalfedgeId)> {
-    let between = |h: HalfedgeId| {
-        let t = mesh.twin(h);
-        if t.is_none() {
-            return None;
-        }
-        let [a, b] = [h, t].map(|h| owner[h.face().index()]);
-        (a < b && b != usize::MAX).then_some(([a, b], h))
-    };
-    let mut borders: Vec<_> = mesh.halfedges().filter_map(between).collect();
-    borders.sort_unstable();
-    borders
-}
-
-/// Of edges, each given by the half-edge on the same side, the connected ones that are longest together.
-fn longest_chain(mesh: &TriMesh, edges: &[HalfedgeId]) -> Vec<HalfedgeId> {
-    let mut ends: Vec<(VertexId, usize)> =
-        edges.iter().enumerate().flat_map(|(i, &h)| [(mesh.from(h), i), (mesh.to(h), i)]).collect();
-    ends.sort_unstable();
-    let mut sets = DisjointSets::new(edges.len());
-    for at in ends.chunk_by(|x, y| x.0 == y.0) {
-        at.windows(2).for_each(|pair| {
-            sets.join(pair[0].1, pair[1].1);
-        });
-    }
-    let root: Vec<usize> = (0..edges.len()).map(|i| sets.root(i)).collect();
-    let mut length = vec![0.0; edges.len()];
-    for (&h, &r) in edges.iter().zip(&root) {
-        length[r] += mesh.edge_length(h);
-    }
-    let longest = (0..edges.len()).max_by(|&a, &b| length[a].total_cmp(&length[b]).then(b.cmp(&a)));
-    edges.iter().zip(&root).filter(|(_, r)| Some(**r) == longest).map(|(h, _)| *h).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::Progress;
     use crate::mesh::test_surfaces;
+    use crate::pipeline::carry::carried_over;
     use crate::pipeline::charting;
+    use nalgebra::Point3;
 
     fn settings(stretch_limit: f64) -> Settings {
         Settings { stretch_limit, ..Settings::default() }
@@ -501,13 +338,13 @@ mod tests {
 
     fn sewn(mesh: &TriMesh, charts: Vec<Chart>, settings: &Settings) -> (Vec<Sewn>, Rungs) {
         let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
-        let result = sew(mesh, &polygon, charts, usize::MAX, settings, &memo::Run::new(&Progress::new(), None))
-            .expect("not cancelled");
+        let result =
+            sew(mesh, &polygon, charts, settings, &memo::Run::new(&Progress::new(), None)).expect("not cancelled");
         for s in &result.0 {
             assert!(s.chart.patch.mesh.topology().is_chart());
             assert!(s.pieces.len() == 1 || s.chart.l2 <= settings.stretch_limit);
-            assert_eq!(crate::stretch::first_flip(&s.chart.patch.mesh, &s.chart.uv), None);
-            assert!(crate::stretch::boundary_is_simple(&s.chart.patch.mesh, &s.chart.uv));
+            assert_eq!(stretch::first_flip(&s.chart.patch.mesh, &s.chart.uv), None);
+            assert!(stretch::boundary_is_simple(&s.chart.patch.mesh, &s.chart.uv));
         }
         let faces: usize = result.0.iter().map(|s| s.chart.patch.faces.len()).sum();
         assert_eq!(faces, mesh.face_count());
@@ -516,27 +353,6 @@ mod tests {
 
     fn hemisphere(p: [Point3<f64>; 3]) -> usize {
         usize::from(p[0].z + p[1].z + p[2].z > 0.0)
-    }
-
-    #[test]
-    fn the_longest_fit_of_a_bent_border_is_its_straight_part() {
-        let turn = Complex::from_polar(1.0, 0.7);
-        let shift = Complex::new(3.0, -1.0);
-        // The second bends away by a right angle after ten of sixteen edges.
-        let points: Vec<[Complex<f64>; 2]> = (0..=16)
-            .map(|k| {
-                let k = f64::from(k);
-                let bent = if k <= 10.0 { Complex::new(k, 0.0) } else { Complex::new(10.0, k - 10.0) };
-                [Complex::new(k, 0.0), (bent - shift) / turn]
-            })
-            .collect();
-        let exact = longest_fit(&points, &[1.0; 16], 16, 1e-9).expect("the straight part");
-        assert_eq!((exact.first, exact.last, exact.length), (0, 10, 10.0));
-        assert!((exact.motion.turn - turn).norm() < 1e-9 && (exact.motion.shift - shift).norm() < 1e-9);
-        let short = longest_fit(&points, &[1.0; 16], 4, 1e-9).expect("four edges");
-        assert_eq!(short.last - short.first, 4);
-        let loose = longest_fit(&points, &[1.0; 16], 16, 0.05).expect("more");
-        assert!(loose.length > 10.0 && loose.length < 14.0, "{}", loose.length);
     }
 
     #[test]

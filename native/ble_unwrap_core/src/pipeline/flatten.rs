@@ -34,6 +34,9 @@ const MOST_FOLDED: f64 = 0.25;
 /// with many holes, where starts are worst, none that began above 3 came under an L2 of 1.1; this leaves room.
 const HOPELESS_START: f64 = 4.0;
 
+/// Charts sewn together begin nearer to their minimum or not at all.
+const HOPELESS_SEWN: f64 = 2.0;
+
 /// A patch whose faces all lean less than 70° from their mean normal is flattened from its projection.
 const MOST_LEANING: f64 = 70.0;
 
@@ -119,8 +122,17 @@ pub(super) fn projected(
     }
 }
 
+/// What came of a start in the plane.
+pub(super) enum Polished {
+    Flat(Flat),
+    /// The limit is out of reach.
+    Refused,
+    /// The start has flips or overlap that cannot be cleared: from another the patch may well be under the limit.
+    BadStart,
+}
+
 /// Flattens a patch of genus 0 with a boundary from a start in the plane near its minimum, whose boundary is all but
-/// simple; `rung` is where the start comes from. `None` where the limit is out of reach or the boundary runs over itself.
+/// simple; `rung` is where the start comes from.
 pub(super) fn polish(
     patch: &Patch,
     start: &[Point2<f64>],
@@ -128,12 +140,16 @@ pub(super) fn polish(
     settings: &Settings,
     rungs: &mut Rungs,
     progress: &Run<'_>,
-) -> Result<Option<Flat>, Cancelled> {
+) -> Result<Polished, Cancelled> {
     if let Some(flat) = isometric(patch, rungs) {
-        return Ok(Some(flat));
+        return Ok(Polished::Flat(flat));
     }
     let trial = Trial::new(patch, settings, progress);
-    recover(trial.polish(start, settings.stretch_limit, rung, rungs))
+    match trial.polish(start, settings.stretch_limit, rung, rungs) {
+        Ok(polished) => Ok(polished),
+        Err(StretchError::Cancelled(c)) => Err(c),
+        Err(_) => Ok(Polished::BadStart),
+    }
 }
 
 /// Flattens a patch that is one polygon, which cannot be split: as well as it goes, and at worst on a
@@ -257,26 +273,29 @@ impl<'a> Trial<'a> {
         limit: f64,
         rung: Rung,
         rungs: &mut Rungs,
-    ) -> Result<Option<Flat>, StretchError> {
-        if self.folded_share(start) > MOST_FOLDED {
-            return Ok(None);
+    ) -> Result<Polished, StretchError> {
+        if self.folded_share(start) > MOST_FOLDED || stretch::boundary_is_tangled(self.steps.mesh, start) {
+            return Ok(Polished::BadStart);
         }
         let cleared = self.recall_start(Kind::LocallyCleared, start, || self.steps.clear_locally(start))?;
-        let Some(mut uv) = cleared else { return Ok(None) };
+        let Some(mut uv) = cleared else { return Ok(Polished::BadStart) };
         rungs.take(if uv == start { rung } else { Rung::FoldoverFree });
         if !self.steps.boundary_is_simple(&uv) {
             let parted = self.recall_start(Kind::Parted, &uv, || self.steps.part_boundary(&uv))?;
-            let Some(parted) = parted else { return Ok(None) };
+            let Some(parted) = parted else { return Ok(Polished::BadStart) };
             uv = parted;
+        }
+        if stretch::l2_stretch(self.steps.mesh, &self.steps.rest, &uv) > HOPELESS_SEWN {
+            return Ok(Polished::BadStart);
         }
         if !self.steps.boundary_is_tight(&uv) {
             match self.free(&uv, Some(limit))? {
-                Free::Simple(flat) => return Ok(Some(flat)),
-                Free::Refused => return Ok(None),
+                Free::Simple(flat) => return Ok(Polished::Flat(flat)),
+                Free::Refused => return Ok(Polished::Refused),
                 Free::Overlaps => {}
             }
         }
-        self.apart(&uv, Some(limit))
+        Ok(self.apart(&uv, Some(limit))?.map_or(Polished::Refused, Polished::Flat))
     }
 
     /// Minimises from a start without flips, its boundary free.

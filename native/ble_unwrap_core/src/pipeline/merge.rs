@@ -5,18 +5,22 @@
 
 use rayon::prelude::*;
 
-use crate::charts::Chart;
-use crate::mesh::{HalfedgeId, TriMesh};
+use crate::charts::{Chart, Patch};
+use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::progress::Cancelled;
 use crate::settings::Settings;
 
-use super::charting::Charting;
+use super::charting::{self, Charting};
 use super::memo::Run;
 use super::rungs::{Rung, Rungs};
-use super::sew;
+use super::sew::{self, Joined};
 
 /// Failed unions a chart may take part in before it is left alone.
 const MOST_FAILURES: usize = 4;
+/// Failed embeddings of unions that could not be sewn, likewise.
+const MOST_EMBEDDED: usize = 2;
+/// On a fine mesh only unions of so many times fewer faces than may be sewn are embedded, which costs as many times more.
+const EMBEDDED_SHARE: usize = 5;
 
 /// Which neighbours are tried.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +34,15 @@ pub(super) enum Which {
     },
 }
 
+/// Where the trial of a union begins.
+#[derive(Clone, Copy, Debug)]
+enum Start {
+    /// With the two charts, laid side by side.
+    Sewn,
+    /// With an embedding of the union, cut open anew: where they did not fit, after all that do have been joined.
+    Embedded,
+}
+
 /// A chart and its history.
 struct Candidate {
     chart: Chart,
@@ -37,13 +50,24 @@ struct Candidate {
     failures: usize,
     /// Came out of a split, or of joining a chart that did.
     split: bool,
-    /// Charts (by index) whose union with this one is known to be over the limit.
+    /// Charts (by index) whose union with this one has been refused.
     refused: Vec<usize>,
+    /// Those among them that did not fit as they lay, and that have not been tried from another start yet.
+    misfits: Vec<usize>,
+    embedded: usize,
 }
 
 impl Candidate {
     fn new(chart: Chart, split: bool) -> Self {
-        Self { area: chart.patch.area(), chart, failures: 0, split, refused: Vec::new() }
+        Self {
+            area: chart.patch.area(),
+            chart,
+            failures: 0,
+            split,
+            refused: Vec::new(),
+            misfits: Vec::new(),
+            embedded: 0,
+        }
     }
 }
 
@@ -86,23 +110,32 @@ pub(super) fn merge(
     }
     loop {
         progress.check()?;
-        let pairs = independent_pairs(&pool, &borders(mesh, &owner, &pool, which));
+        let mut start = Start::Sewn;
+        let mut pairs = independent_pairs(&pool, &borders(mesh, &owner, &pool, which, start));
+        if pairs.is_empty() {
+            start = Start::Embedded;
+            pairs = independent_pairs(&pool, &borders(mesh, &owner, &pool, which, start));
+        }
         if pairs.is_empty() {
             break;
         }
-        let tests: Vec<Result<(Option<Chart>, Rungs), Cancelled>> = pairs
+        let tests: Vec<Result<(Joined, Rungs), Cancelled>> = pairs
             .par_iter()
             .with_max_len(1)
             .map(|&(a, b)| {
                 let mut rungs = Rungs::default();
-                let (Some(one), Some(other)) = (&pool[a], &pool[b]) else { return Ok((None, rungs)) };
+                let (Some(one), Some(other)) = (&pool[a], &pool[b]) else { return Ok((Joined::Refused, rungs)) };
                 let sides = [&one.chart, &other.chart];
-                Ok((sew::joined(mesh, polygon, sides, settings, &mut rungs, progress)?, rungs))
+                let joined = match start {
+                    Start::Sewn => sew::joined(mesh, polygon, sides, settings, &mut rungs, progress)?,
+                    Start::Embedded => embedded(mesh, polygon, sides, settings, &mut rungs, progress)?,
+                };
+                Ok((joined, rungs))
             })
             .collect();
         for (&(a, b), test) in pairs.iter().zip(tests) {
             let (joined, steps) = test?;
-            if let Some(chart) = joined {
+            if let Joined::Chart(chart) = joined {
                 rungs.add(&steps);
                 rungs.take(Rung::Merge);
                 for f in &chart.patch.faces {
@@ -111,12 +144,20 @@ pub(super) fn merge(
                 let split = [a, b].iter().any(|&i| pool[i].as_ref().is_some_and(|c| c.split));
                 pool[a] = None;
                 pool[b] = None;
-                pool.push(Some(Candidate::new(chart, split)));
+                pool.push(Some(Candidate::new(*chart, split)));
             } else {
                 for (one, other) in [(a, b), (b, a)] {
-                    if let Some(c) = &mut pool[one] {
-                        c.failures += 1;
-                        c.refused.push(other);
+                    let Some(c) = &mut pool[one] else { continue };
+                    match start {
+                        Start::Sewn => {
+                            c.failures += 1;
+                            c.refused.push(other);
+                            c.misfits.extend(matches!(joined, Joined::Misfit).then_some(other));
+                        }
+                        Start::Embedded => {
+                            c.embedded += 1;
+                            c.misfits.retain(|&m| m != other);
+                        }
                     }
                 }
             }
@@ -127,15 +168,54 @@ pub(super) fn merge(
     Ok((charts, rungs))
 }
 
+/// The union of two charts flattened anew, whatever they look like now.
+fn embedded(
+    mesh: &TriMesh,
+    polygon: &[u32],
+    sides: [&Chart; 2],
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Run<'_>,
+) -> Result<Joined, Cancelled> {
+    let mut faces: Vec<FaceId> = sides.iter().flat_map(|c| c.patch.faces.iter().copied()).collect();
+    faces.sort_unstable();
+    let patch = Patch::of_surface(mesh, polygon, faces);
+    let chart = charting::as_one(&patch, settings, rungs, progress)?;
+    Ok(chart.map_or(Joined::Refused, |chart| Joined::Chart(Box::new(chart))))
+}
+
 /// Shared border length of each pair of charts that may still be tested, sorted by pair.
-fn borders(mesh: &TriMesh, owner: &[usize], pool: &[Option<Candidate>], which: Which) -> Vec<(usize, usize, f64)> {
+fn borders(
+    mesh: &TriMesh,
+    owner: &[usize],
+    pool: &[Option<Candidate>],
+    which: Which,
+    start: Start,
+) -> Vec<(usize, usize, f64)> {
     let faces = |i: usize| pool[i].as_ref().map_or(0, |c| c.chart.patch.faces.len());
     let split = |i: usize| pool[i].as_ref().is_some_and(|c| c.split);
     let wanted = |a: usize, b: usize| match which {
         Which::All => true,
-        Which::AfterSplits { most_faces } => (split(a) || split(b)) && faces(a) + faces(b) <= most_faces,
+        Which::AfterSplits { most_faces } => {
+            let most = match start {
+                Start::Sewn => most_faces,
+                Start::Embedded => most_faces / EMBEDDED_SHARE,
+            };
+            (split(a) || split(b)) && faces(a) + faces(b) <= most
+        }
     };
-    let open = |i: usize| pool[i].as_ref().is_some_and(|c| c.failures < MOST_FAILURES);
+    let open = |i: usize| {
+        pool[i].as_ref().is_some_and(|c| match start {
+            Start::Sewn => c.failures < MOST_FAILURES,
+            Start::Embedded => c.embedded < MOST_EMBEDDED,
+        })
+    };
+    let untried = |a: usize, b: usize| {
+        pool[a].as_ref().is_some_and(|c| match start {
+            Start::Sewn => !c.refused.contains(&b),
+            Start::Embedded => c.misfits.contains(&b),
+        })
+    };
     let shared = |h: HalfedgeId| {
         let t = mesh.twin(h);
         if t.is_none() || t < h {
@@ -143,8 +223,7 @@ fn borders(mesh: &TriMesh, owner: &[usize], pool: &[Option<Candidate>], which: W
         }
         let (a, b) = (owner[h.face().index()], owner[t.face().index()]);
         let (a, b) = (a.min(b), a.max(b));
-        let refused = || pool[a].as_ref().is_some_and(|c| c.refused.contains(&b));
-        (a != b && b != usize::MAX && wanted(a, b) && open(a) && open(b) && !refused())
+        (a != b && b != usize::MAX && wanted(a, b) && open(a) && open(b) && untried(a, b))
             .then(|| (a, b, mesh.edge_length(h) * mesh.border_cost(h)))
     };
     let mut sides: Vec<(usize, usize, f64)> = mesh.halfedges().filter_map(shared).collect();

@@ -7,6 +7,7 @@
 
 mod analysis;
 mod budget;
+mod carry;
 mod charting;
 mod component;
 mod darts;
@@ -15,6 +16,7 @@ mod flatten;
 mod memo;
 mod merge;
 mod prolong;
+mod rigid;
 mod rungs;
 mod sew;
 mod steps;

@@ -4,22 +4,30 @@
 //! moved rigidly until the border meets, what does not meet is shared between both sides, and the stretch is minimised
 //! from there. How far the border stays apart tells early that a union is hopeless.
 
-use nalgebra::{Point2, Rotation2, Vector2};
+use nalgebra::Point2;
 
 use crate::charts::{Chart, Patch};
+use crate::distortion::RestTriangle;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::Cancelled;
 use crate::settings::{Holes, Settings};
+use crate::stretch;
 
-use super::flatten;
+use super::flatten::{self, Polished};
 use super::memo::Run;
+use super::rigid::Motion;
 use super::rungs::{Rung, Rungs};
 
-/// The charts' vertices share what is left of the gap over about the root of so many rings.
-const SWEEPS: usize = 40;
+/// What came of sewing two charts together.
+pub(super) enum Joined {
+    Chart(Box<Chart>),
+    /// Over the limit, or not of a chart's topology.
+    Refused,
+    /// The charts, as they lie, do not fit together without flips or overlap.
+    Misfit,
+}
 
-/// The union of two neighbouring charts of `mesh` as one chart under the limit; `None` where it has not that topology or
-/// is over the limit. First sewn all along their border; where that has several stretches, also along the longest alone,
+/// The union of two neighbouring charts of `mesh` as one chart under the limit. First sewn all along their border; where that has several stretches, also along the longest alone,
 /// and cut open along the others.
 pub(super) fn joined(
     mesh: &TriMesh,
@@ -28,12 +36,13 @@ pub(super) fn joined(
     settings: &Settings,
     rungs: &mut Rungs,
     progress: &Run<'_>,
-) -> Result<Option<Chart>, Cancelled> {
+) -> Result<Joined, Cancelled> {
     let sides = Sides { mesh, a: Side::new(a), b: Side::new(b) };
     let stretches = sides.stretches();
     let length = |s: &[Sewn]| s.iter().map(|e| mesh.edge_length(e.surface)).sum::<f64>();
     let longest = stretches.iter().max_by(|s, t| length(s).total_cmp(&length(t)).then(t[0].surface.cmp(&s[0].surface)));
-    let Some(longest) = longest else { return Ok(None) };
+    let Some(longest) = longest else { return Ok(Joined::Refused) };
+    let mut verdict = Joined::Refused;
     let everything = stretches.concat();
     let mut ways = vec![everything.as_slice()];
     if stretches.len() > 1 {
@@ -46,12 +55,14 @@ pub(super) fn joined(
         if !topology.is_chart() || (settings.holes != Holes::Keep && topology.loops > 1) {
             continue;
         }
-        let start = sides.start(&patch, seam);
-        if let Some(flat) = flatten::polish(&patch, &start, Rung::Sewn, settings, rungs, progress)? {
-            return Ok(Some(flat.into_chart(patch)));
+        let Some(start) = sides.start(&patch, seam) else { continue };
+        match flatten::polish(&patch, &start, Rung::Sewn, settings, rungs, progress)? {
+            Polished::Flat(flat) => return Ok(Joined::Chart(Box::new(flat.into_chart(patch)))),
+            Polished::BadStart => verdict = Joined::Misfit,
+            Polished::Refused => {}
         }
     }
-    Ok(None)
+    Ok(verdict)
 }
 
 /// An edge of the border: on the surface and on both charts.
@@ -152,80 +163,34 @@ impl Sides<'_> {
         Patch { mesh, vertices, polygon: faces.iter().map(|f| polygon[f.index()]).collect(), faces }
     }
 
-    /// A position in the plane for each vertex of the union.
-    fn start(&self, patch: &Patch, seam: &[Sewn]) -> Vec<Point2<f64>> {
+    /// A position in the plane for each vertex of the union; `None` where its system cannot be factored.
+    fn start(&self, patch: &Patch, seam: &[Sewn]) -> Option<Vec<Point2<f64>>> {
         let moved = self.alignment(seam);
-        let n = patch.mesh.vertex_count();
-        // For each side: where it puts the vertex, if it has it.
-        let mut places = [vec![None; n], vec![None; n]];
-        for (f, corners) in patch.faces.iter().zip(patch.mesh.triangles()) {
-            let (side, local) = match (self.a.local(*f), self.b.local(*f)) {
-                (Some(local), _) => (0, local),
-                (None, Some(local)) => (1, local),
-                (None, None) => continue,
-            };
-            let chart = [&self.a, &self.b][side];
-            for (v, own) in corners.iter().zip(chart.mesh().triangle(local)) {
-                let p = chart.uv(own);
-                places[side][v.index()] = Some(if side == 0 { p } else { moved(p) });
-            }
-        }
-        met(&patch.mesh, &places)
+        let drawn: Vec<[Point2<f64>; 3]> = patch
+            .faces
+            .iter()
+            .map(|f| match (self.a.local(*f), self.b.local(*f)) {
+                (Some(local), _) => self.a.mesh().triangle(local).map(|v| self.a.uv(v)),
+                (None, Some(local)) => self.b.mesh().triangle(local).map(|v| moved.apply(self.b.uv(v))),
+                (None, None) => [Point2::origin(); 3],
+            })
+            .collect();
+        stretch::stitch(&patch.mesh, &RestTriangle::of_mesh(&patch.mesh), &drawn).ok()
     }
 
     /// The rigid motion of the second chart that takes its side of the seam nearest to the first's, by length.
-    fn alignment(&self, seam: &[Sewn]) -> impl Fn(Point2<f64>) -> Point2<f64> + use<> {
-        let pairs = || {
-            seam.iter().flat_map(|s| {
+    fn alignment(&self, seam: &[Sewn]) -> Motion {
+        let pairs: Vec<_> = seam
+            .iter()
+            .flat_map(|s| {
                 let (a, b) = (self.a.mesh(), self.b.mesh());
                 let weight = self.mesh.edge_length(s.surface);
                 [(a.from(s.a), b.to(s.b)), (a.to(s.a), b.from(s.b))]
-                    .map(|(v, w)| (self.a.uv(v).coords, self.b.uv(w).coords, weight))
+                    .map(|(v, w)| ([self.a.uv(v), self.b.uv(w)], weight))
             })
-        };
-        let total: f64 = pairs().map(|p| p.2).sum::<f64>().max(f64::MIN_POSITIVE);
-        let (to, from) = pairs().fold((Vector2::zeros(), Vector2::zeros()), |(to, from), (p, q, w)| {
-            (to + p * (w / total), from + q * (w / total))
-        });
-        let (cos, sin) = pairs().fold((0.0, 0.0), |(cos, sin), (p, q, w)| {
-            let (p, q) = (p - to, q - from);
-            (cos + w * q.dot(&p), sin + w * q.perp(&p))
-        });
-        let turn = Rotation2::new(f64::atan2(sin, cos));
-        move |p| Point2::from(turn * (p.coords - from) + to)
+            .collect();
+        Motion::fit(&pairs)
     }
-}
-
-/// A position for each vertex of a union, from where either side puts those it has: what they share lies in the middle,
-/// and the rest gives way towards it.
-pub(super) fn met(mesh: &TriMesh, places: &[Vec<Option<Point2<f64>>>; 2]) -> Vec<Point2<f64>> {
-    let mut start = vec![Point2::origin(); mesh.vertex_count()];
-    let middle: Vec<Option<Point2<f64>>> =
-        places[0].iter().zip(&places[1]).map(|(p, q)| Some(nalgebra::center(&(*p)?, &(*q)?))).collect();
-    for places in places {
-        let shift = spread_shift(mesh, places, &middle);
-        for ((to, place), shift) in start.iter_mut().zip(places).zip(shift) {
-            if let Some(p) = place {
-                *to = p + shift;
-            }
-        }
-    }
-    start
-}
-
-/// How far each vertex of a side moves when its border moves to the middle between both sides: less and less, away from
-/// the border.
-fn spread_shift(mesh: &TriMesh, places: &[Option<Point2<f64>>], middle: &[Option<Point2<f64>>]) -> Vec<Vector2<f64>> {
-    let mut shift: Vec<Vector2<f64>> =
-        middle.iter().zip(places).map(|(m, p)| m.zip(*p).map_or_else(Vector2::zeros, |(m, p)| m - p)).collect();
-    for _ in 0..SWEEPS {
-        for v in mesh.vertices().filter(|v| places[v.index()].is_some() && middle[v.index()].is_none()) {
-            let (sum, count) =
-                mesh.neighbours(v).fold((Vector2::zeros(), 0.0), |(s, n), w| (s + shift[w.index()], n + 1.0));
-            shift[v.index()] = sum / count;
-        }
-    }
-    shift
 }
 
 #[cfg(test)]
@@ -233,6 +198,7 @@ mod tests {
     use super::*;
     use crate::Progress;
     use crate::mesh::test_surfaces;
+    use nalgebra::{Rotation2, Vector2};
 
     /// The faces of a square sheet with their middle in x between two bounds, drawn in the plane turned by some angle.
     fn part(mesh: &TriMesh, from: f64, to: f64, angle: f64) -> Chart {
@@ -245,7 +211,7 @@ mod tests {
         Chart { patch, uv, l2: 1.0 }
     }
 
-    fn join(mesh: &TriMesh, charts: [&Chart; 2]) -> Option<Chart> {
+    fn join(mesh: &TriMesh, charts: [&Chart; 2]) -> Joined {
         let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
         let progress = Progress::new();
         let run = Run::new(&progress, None);
@@ -261,18 +227,19 @@ mod tests {
         assert_eq!((stretches.len(), stretches[0].len()), (1, 12));
         let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
         let patch = sides.union(&polygon, &stretches[0]);
-        let start = sides.start(&patch, &stretches[0]);
+        let start = sides.start(&patch, &stretches[0]).expect("factored");
         for h in patch.mesh.halfedges() {
             let laid = (start[patch.mesh.from(h).index()] - start[patch.mesh.to(h).index()]).norm();
-            assert!((laid - patch.mesh.edge_length(h)).abs() < 1e-12, "an isometry: nothing is left to share");
+            assert!((laid - patch.mesh.edge_length(h)).abs() < 1e-8, "an isometry: nothing is left to share");
         }
-        let whole = join(&mesh, [&left, &right]).expect("one chart");
+        let Joined::Chart(whole) = join(&mesh, [&left, &right]) else { panic!("one chart") };
         assert!(whole.l2 < 1.0 + 1e-9 && whole.patch.faces.len() == mesh.face_count());
     }
 
     #[test]
     fn charts_that_do_not_touch_are_not_joined() {
         let mesh = test_surfaces::grid(12, 12, [1.0, 1.0], 0.0);
-        assert!(join(&mesh, [&part(&mesh, -1.0, 0.25, 0.0), &part(&mesh, 0.75, 2.0, 1.0)]).is_none());
+        let apart = join(&mesh, [&part(&mesh, -1.0, 0.25, 0.0), &part(&mesh, 0.75, 2.0, 1.0)]);
+        assert!(matches!(apart, Joined::Refused));
     }
 }

@@ -13,7 +13,7 @@ use crate::mesh::TriMesh;
 use crate::progress::Progress;
 
 /// Up to this share of flipped triangles, and always if they are no more than
-const FEW_FLIPS: f64 = 0.02;
+const FEW_FLIPS: f64 = 0.1;
 /// so many, they are cleared in their neighbourhoods of so many rings,
 const ALWAYS_FEW: usize = 8;
 /// the second only where the first was too narrow.

@@ -27,6 +27,7 @@ mod neighbourhood;
 mod newton;
 mod overlap;
 mod part_boundary;
+mod stitch;
 mod system;
 #[cfg(test)]
 mod test_meshes;
@@ -41,7 +42,8 @@ pub use measure::{
     l2_of_positions, l2_stretch, l2_unsigned, linf_stretch, plane_area, rescale_to_equal_area, surface_area,
 };
 pub use overlap::{BoundaryDefect, boundary_defect, boundary_is_simple, first_flip};
-pub use part_boundary::part_boundary;
+pub use part_boundary::{boundary_is_tangled, part_boundary};
+pub use stitch::stitch;
 pub use tutte::{TutteBoundary, tutte_embedding};
 
 use crate::distortion::RestTriangle;

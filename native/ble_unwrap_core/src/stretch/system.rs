@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Point2, Vector2};
 
 use super::energy::{HatGradients, IsotropicEnergy, face_derivatives};
 use crate::distortion::RestTriangle;
-use crate::linalg::{SparseCholesky, SparseError, SparsePattern};
+use crate::linalg::{RoughCholesky, SparseError, SparsePattern};
 use crate::mesh::{HalfedgeId, TriMesh};
 
 /// Relative weight added to each diagonal entry of the Hessian, which is singular for translations
@@ -34,7 +34,7 @@ pub(super) struct ChartSystem {
     /// Where the scalar diagonal entries are, and what was assembled there before the ridge.
     diagonal_entries: Vec<u32>,
     base_diagonal: Vec<f64>,
-    solver: SparseCholesky,
+    solver: RoughCholesky,
     hessian: Vec<f64>,
     gradient: Vec<f64>,
 }
@@ -62,7 +62,8 @@ impl ChartSystem {
         let triangles: Vec<[u32; 3]> = mesh.triangles().iter().map(|t| t.map(|v| v.index() as u32)).collect();
         let pairs = triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
         let vertices = SparsePattern::from_pairs(mesh.vertex_count(), pairs);
-        let pattern = vertices.with_blocks_of_two();
+        let solver = RoughCholesky::analyse(&vertices)?;
+        let pattern = solver.pattern();
         let place = |i: u32, j: u32| {
             pattern.position(2 * i.min(j) as usize, 2 * i.max(j) as usize).map_or(u32::MAX, |p| p as u32)
         };
@@ -80,7 +81,7 @@ impl ChartSystem {
             hessian: vec![0.0; pattern.entry_count()],
             gradient: vec![0.0; 2 * mesh.vertex_count()],
             triangles,
-            solver: SparseCholesky::analyse(pattern)?,
+            solver,
         })
     }
 
@@ -191,7 +192,7 @@ impl ChartSystem {
                 for (d, g) in direction.iter_mut().zip(&self.gradient) {
                     *d = -g;
                 }
-                self.solver.solve_in_place(direction);
+                self.solver.solve_in_place(&self.hessian, direction);
                 let slope: f64 = direction.iter().zip(&self.gradient).map(|(d, g)| d * g).sum();
                 if slope < 0.0 && slope.is_finite() {
                     return Some(slope);

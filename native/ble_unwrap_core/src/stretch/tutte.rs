@@ -162,10 +162,11 @@ impl TutteSystem {
 
         let mut edges = Vec::new();
         let mut weights = Vec::new();
+        let cotangent = |h: HalfedgeId| rest[h.face().index()].cotangents()[h.slot()];
         for h in mesh.edges() {
-            let twin = (!mesh.is_boundary(h)).then(|| cotangent(rest, mesh.twin(h)));
+            let twin = (!mesh.is_boundary(h)).then(|| cotangent(mesh.twin(h)));
             edges.push([mesh.from(h), mesh.to(h)].map(|v| v.index() as u32));
-            weights.push((0.5 * (cotangent(rest, h) + twin.unwrap_or(0.0))).clamp(WEIGHTS.0, WEIGHTS.1));
+            weights.push((0.5 * (cotangent(h) + twin.unwrap_or(0.0))).clamp(WEIGHTS.0, WEIGHTS.1));
         }
         for (hole, l) in (0..loops.len()).filter(|&l| l != outer).enumerate() {
             for &h in loops.group(l) {
@@ -239,14 +240,6 @@ impl TutteSystem {
             *w /= (stretch(a) * stretch(b)).sqrt();
         }
     }
-}
-
-/// Cotangent of the angle opposite a half-edge.
-fn cotangent(rest: &[RestTriangle], h: HalfedgeId) -> f64 {
-    let c = rest[h.face().index()].corners();
-    let apex = c[(h.slot() + 2) % 3];
-    let (a, b) = (c[h.slot()] - apex, c[(h.slot() + 1) % 3] - apex);
-    a.dot(&b) / a.perp(&b)
 }
 
 #[cfg(test)]
