@@ -94,9 +94,7 @@ impl SparseCholesky {
 }
 
 /// Solves systems of 2×2 blocks, a block for each entry of a pattern, roughly: a factor in single precision, which takes
-/// half the memory and half the time, leads conjugate gradients in double precision to a small residual. Serial.
-///
-/// On the Hessian of a chart of 100,000 faces most of the time goes into the factor still.
+/// half the memory, leads conjugate gradients in double precision to a small residual. Serial, like [`SparseCholesky`].
 pub struct RoughCholesky {
     pattern: SparsePattern,
     factor: Factor<f32>,

@@ -62,14 +62,15 @@ pub(super) fn sew(
     progress: &memo::Run<'_>,
 ) -> Result<(Vec<Sewn>, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
+    let is_wanted = settings.merge && settings.least_sewn < NEVER_SEWN;
     let whole = |(i, chart)| Some(Piece::new(Sewn { chart, pieces: vec![i], edges: Vec::new() }));
     let pool: Vec<Option<Piece>> = charts.into_iter().enumerate().map(whole).collect();
     let mut table =
         Table { mesh, polygon, owner: vec![(usize::MAX, 0); mesh.face_count()], pool, least_sewn: settings.least_sewn };
     (0..table.pool.len()).for_each(|i| table.claim(i));
-    while settings.merge && settings.least_sewn < NEVER_SEWN {
+    loop {
         progress.check()?;
-        let seams = table.independent_seams();
+        let seams = if is_wanted { table.independent_seams() } else { Vec::new() };
         if seams.is_empty() {
             break;
         }

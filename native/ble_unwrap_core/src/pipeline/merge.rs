@@ -1,7 +1,8 @@
 //! Charts joined to larger ones where the union still flattens under the limit.
 //!
 //! Splitting top-down is greedy: two neighbours from different branches may well be one chart. Iso-charts
-//! merges by an estimate; here the real flattening is the judge.
+//! merges by an estimate; here the real flattening is the judge: first of the two charts as they are, sewn together, and
+//! where they do not fit of their union embedded anew.
 
 use rayon::prelude::*;
 
