@@ -14,7 +14,7 @@ use crate::settings::{ChartScale, LimitOver, Settings};
 use super::memo::{self, Fingerprint, Kind, Memo, Run};
 use super::rungs::Rungs;
 use super::tally::Tally;
-use super::{Atlas, Clock, budget, component, finish};
+use super::{Atlas, Clock, budget, component, finish, ribbons};
 
 /// A mesh and what was found out about it, for unwrapping it several times with different settings.
 ///
@@ -153,6 +153,9 @@ impl Prepared {
             let (joined, steps) = budget::spend(&surface.mesh, &surface.polygon, charts, settings, progress)?;
             charts = joined;
             rungs.add(&steps);
+        }
+        if settings.coarse {
+            charts = ribbons::cut(charts, settings, &mut rungs, progress)?;
         }
         clock.lap("charts");
         finish::finish(input, surface, charts, rungs, settings, clock, progress)

@@ -10,11 +10,9 @@ use nalgebra::{Complex, Point2};
 use rayon::prelude::*;
 
 use crate::charts::{Chart, Patch};
-use crate::distortion::RestTriangle;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::progress::Cancelled;
 use crate::settings::{NEVER_SEWN, Settings};
-use crate::stretch;
 
 use super::flatten::{self, Polished};
 use super::memo;
@@ -79,11 +77,9 @@ pub(super) fn sew(
             .with_max_len(1)
             .map(|seam| {
                 let mut rungs = Rungs::default();
-                let (patch, start) = table.joined(seam);
-                let chart = if patch.mesh.topology().is_chart()
-                    && let Some(start) = start
-                {
-                    match flatten::polish(&patch, &start, Rung::Sewn, settings, &mut rungs, progress)? {
+                let (patch, drawn) = table.joined(seam);
+                let chart = if patch.mesh.topology().is_chart() {
+                    match flatten::sewn(&patch, &drawn, settings, &mut rungs, progress)? {
                         Polished::Flat(flat) => Some(flat.into_chart(patch)),
                         Polished::Refused | Polished::BadStart => None,
                     }
@@ -250,8 +246,8 @@ impl Table<'_> {
         self.place(h.next())
     }
 
-    /// The union of two pieces, glued along a seam, and the two maps laid together.
-    fn joined(&self, seam: &Seam) -> (Patch, Option<Vec<Point2<f64>>>) {
+    /// The union of two pieces, glued along a seam, and where each face is drawn, one piece laid against the other.
+    fn joined(&self, seam: &Seam) -> (Patch, Vec<[Point2<f64>; 3]>) {
         let mesh = self.mesh;
         let mut faces: Vec<FaceId> =
             seam.pieces.iter().filter_map(|&i| self.chart(i)).flat_map(|c| c.patch.faces.iter().copied()).collect();
@@ -272,9 +268,8 @@ impl Table<'_> {
             if self.owner[f.index()].0 == seam.pieces[1] { place.map(|p| seam.motion.apply(p)) } else { place }
         };
         let drawn: Vec<[Point2<f64>; 3]> = faces.iter().map(draw).collect();
-        let start = stretch::stitch(&part, &RestTriangle::of_mesh(&part), &drawn).ok();
         let polygon = faces.iter().map(|f| self.polygon[f.index()]).collect();
-        (Patch { mesh: part, vertices, polygon, faces }, start)
+        (Patch { mesh: part, vertices, polygon, faces }, drawn)
     }
 
     fn replace(&mut self, seam: &Seam, chart: Chart) {
@@ -316,6 +311,7 @@ mod tests {
     use crate::mesh::test_surfaces;
     use crate::pipeline::carry::carried_over;
     use crate::pipeline::charting;
+    use crate::stretch;
     use nalgebra::Point3;
 
     fn settings(stretch_limit: f64) -> Settings {

@@ -41,9 +41,9 @@ const HOPELESS_SEWN: f64 = 2.0;
 const MOST_LEANING: f64 = 70.0;
 
 /// A position in the plane for each vertex.
-type Start = Vec<Point2<f64>>;
+type Positions = Vec<Point2<f64>>;
 
-fn bytes_of_start(start: &Option<Start>) -> usize {
+fn bytes_of_start(start: &Option<Positions>) -> usize {
     16 * start.as_ref().map_or(0, Vec::len)
 }
 
@@ -62,16 +62,19 @@ impl Flat {
 /// Isometric flattening of a planar or developable patch of genus 0 with a boundary; `None` where
 /// there is none without overlap.
 pub(super) fn isometric(patch: &Patch, rungs: &mut Rungs) -> Option<Flat> {
+    isometric_of(patch, &RestTriangle::of_mesh(&patch.mesh), rungs)
+}
+
+fn isometric_of(patch: &Patch, rest: &[RestTriangle], rungs: &mut Rungs) -> Option<Flat> {
     let mesh = &patch.mesh;
-    let rest = RestTriangle::of_mesh(mesh);
     let (uv, rung) = match embedding::plane(mesh) {
         Some(uv) => (uv, Rung::Plane),
-        None => (embedding::unfold(mesh, &rest)?, Rung::Unfold),
+        None => (embedding::unfold(mesh, rest)?, Rung::Unfold),
     };
     if stretch::first_flip(mesh, &uv).is_some() || !stretch::boundary_is_simple(mesh, &uv) {
         return None;
     }
-    let l2 = l2(patch, &rest, &uv);
+    let l2 = l2(patch, rest, &uv);
     if l2 > ISOMETRIC {
         return None;
     }
@@ -141,15 +144,49 @@ pub(super) fn polish(
     rungs: &mut Rungs,
     progress: &Run<'_>,
 ) -> Result<Polished, Cancelled> {
-    if let Some(flat) = isometric(patch, rungs) {
+    let trial = Trial::new(patch, settings, progress);
+    if let Some(flat) = isometric_of(patch, &trial.steps.rest, rungs) {
         return Ok(Polished::Flat(flat));
     }
+    trial.polish_or_not(start, rung, rungs)
+}
+
+/// Flattens the union of charts from where their faces are drawn, side by side in the plane: what does not meet is spread
+/// over the whole map.
+pub(super) fn sewn(
+    patch: &Patch,
+    drawn: &[[Point2<f64>; 3]],
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Run<'_>,
+) -> Result<Polished, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
-    match trial.polish(start, settings.stretch_limit, rung, rungs) {
-        Ok(polished) => Ok(polished),
-        Err(StretchError::Cancelled(c)) => Err(c),
+    if let Some(flat) = isometric_of(patch, &trial.steps.rest, rungs) {
+        return Ok(Polished::Flat(flat));
+    }
+    match stretch::stitch(&patch.mesh, &trial.steps.rest, drawn) {
+        Ok(start) => trial.polish_or_not(&start, Rung::Sewn, rungs),
         Err(_) => Ok(Polished::BadStart),
     }
+}
+
+/// A part of a chart, where it lies if that is under the limit, and else minimised by itself. `None` where that is over it,
+/// too: a chart's stretch is a mean over its parts.
+pub(super) fn part_of_chart(
+    patch: &Patch,
+    start: Positions,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Run<'_>,
+) -> Result<Option<Flat>, Cancelled> {
+    let trial = Trial::new(patch, settings, progress);
+    if let Some(flat) = trial.judge(start.clone(), Some(settings.chart_limit())) {
+        return Ok(Some(flat));
+    }
+    Ok(match trial.polish_or_not(&start, Rung::Prolonged, rungs)? {
+        Polished::Flat(flat) => Some(flat),
+        Polished::Refused | Polished::BadStart => None,
+    })
 }
 
 /// Flattens a patch that is one polygon, which cannot be split: as well as it goes, and at worst on a
@@ -267,6 +304,15 @@ impl<'a> Trial<'a> {
         self.flatten_apart(limit, rungs)
     }
 
+    /// As [`Trial::polish`]; a patch that defeats a solver has a bad start.
+    fn polish_or_not(&self, start: &[Point2<f64>], rung: Rung, rungs: &mut Rungs) -> Result<Polished, Cancelled> {
+        match self.polish(start, self.settings.stretch_limit, rung, rungs) {
+            Ok(polished) => Ok(polished),
+            Err(StretchError::Cancelled(c)) => Err(c),
+            Err(_) => Ok(Polished::BadStart),
+        }
+    }
+
     fn polish(
         &self,
         start: &[Point2<f64>],
@@ -320,7 +366,7 @@ impl<'a> Trial<'a> {
     }
 
     /// `None` where the distances do not span a plane; Tutte needs none.
-    fn embed(&self, distances: &LandmarkDistances) -> Result<Option<Start>, Cancelled> {
+    fn embed(&self, distances: &LandmarkDistances) -> Result<Option<Positions>, Cancelled> {
         let input = |f: &mut Fingerprint| {
             f.mesh(self.steps.mesh);
             f.distances(distances);

@@ -7,16 +7,14 @@
 use nalgebra::Point2;
 
 use crate::charts::{Chart, Patch};
-use crate::distortion::RestTriangle;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::Cancelled;
 use crate::settings::{Holes, Settings};
-use crate::stretch;
 
 use super::flatten::{self, Polished};
 use super::memo::Run;
 use super::rigid::Motion;
-use super::rungs::{Rung, Rungs};
+use super::rungs::Rungs;
 
 /// What came of sewing two charts together.
 pub(super) enum Joined {
@@ -55,8 +53,7 @@ pub(super) fn joined(
         if !topology.is_chart() || (settings.holes != Holes::Keep && topology.loops > 1) {
             continue;
         }
-        let Some(start) = sides.start(&patch, seam) else { continue };
-        match flatten::polish(&patch, &start, Rung::Sewn, settings, rungs, progress)? {
+        match flatten::sewn(&patch, &sides.drawn(&patch, seam), settings, rungs, progress)? {
             Polished::Flat(flat) => return Ok(Joined::Chart(Box::new(flat.into_chart(patch)))),
             Polished::BadStart => verdict = Joined::Misfit,
             Polished::Refused => {}
@@ -163,19 +160,15 @@ impl Sides<'_> {
         Patch { mesh, vertices, polygon: faces.iter().map(|f| polygon[f.index()]).collect(), faces }
     }
 
-    /// A position in the plane for each vertex of the union; `None` where its system cannot be factored.
-    fn start(&self, patch: &Patch, seam: &[Sewn]) -> Option<Vec<Point2<f64>>> {
+    /// Where each face of the union is drawn, the second chart laid against the first.
+    fn drawn(&self, patch: &Patch, seam: &[Sewn]) -> Vec<[Point2<f64>; 3]> {
         let moved = self.alignment(seam);
-        let drawn: Vec<[Point2<f64>; 3]> = patch
-            .faces
-            .iter()
-            .map(|f| match (self.a.local(*f), self.b.local(*f)) {
-                (Some(local), _) => self.a.mesh().triangle(local).map(|v| self.a.uv(v)),
-                (None, Some(local)) => self.b.mesh().triangle(local).map(|v| moved.apply(self.b.uv(v))),
-                (None, None) => [Point2::origin(); 3],
-            })
-            .collect();
-        stretch::stitch(&patch.mesh, &RestTriangle::of_mesh(&patch.mesh), &drawn).ok()
+        let draw = |f: &FaceId| match (self.a.local(*f), self.b.local(*f)) {
+            (Some(local), _) => self.a.mesh().triangle(local).map(|v| self.a.uv(v)),
+            (None, Some(local)) => self.b.mesh().triangle(local).map(|v| moved.apply(self.b.uv(v))),
+            (None, None) => [Point2::origin(); 3],
+        };
+        patch.faces.iter().map(draw).collect()
     }
 
     /// The rigid motion of the second chart that takes its side of the seam nearest to the first's, by length.
@@ -227,10 +220,11 @@ mod tests {
         assert_eq!((stretches.len(), stretches[0].len()), (1, 12));
         let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
         let patch = sides.union(&polygon, &stretches[0]);
-        let start = sides.start(&patch, &stretches[0]).expect("factored");
-        for h in patch.mesh.halfedges() {
-            let laid = (start[patch.mesh.from(h).index()] - start[patch.mesh.to(h).index()]).norm();
-            assert!((laid - patch.mesh.edge_length(h)).abs() < 1e-8, "an isometry: nothing is left to share");
+        let drawn = sides.drawn(&patch, &stretches[0]);
+        let mut place = vec![None; patch.mesh.vertex_count()];
+        for (v, p) in patch.mesh.triangles().iter().zip(&drawn).flat_map(|(t, p)| t.iter().zip(p)) {
+            let first = *place[v.index()].get_or_insert(*p);
+            assert!((first - p).norm() < 1e-12, "an isometry: nothing is left to share");
         }
         let Joined::Chart(whole) = join(&mesh, [&left, &right]) else { panic!("one chart") };
         assert!(whole.l2 < 1.0 + 1e-9 && whole.patch.faces.len() == mesh.face_count());

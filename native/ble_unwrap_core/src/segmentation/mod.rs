@@ -11,11 +11,12 @@
 //! 4. Boundaries: a minimum cut in a band around each border, drawn to creases and to short lines.
 //! 5. Repair: parts become connected, fragments go to a neighbour.
 //!
-//! [`straighten()`] redraws borders that come from a coarser mesh.
+//! [`straighten()`] redraws borders that come from a coarser mesh; [`between()`] parts a patch between two given places.
 //!
 //! Polygons stay whole. The result is a label a face; each label is connected over polygon sides.
 
 mod bends;
+mod between;
 mod boundary;
 mod grow;
 mod guides;
@@ -30,6 +31,7 @@ use crate::geodesics::LandmarkDistances;
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
 
+pub use between::between;
 pub use min_cut::CutGraph;
 use polygon_graph::PolygonGraph;
 pub use spectral::SpectralAnalysis;
