@@ -143,7 +143,7 @@ others on this machine; `make bench` times the same embedding on one core by its
 
 ## The three methods on the same charts
 
-The charts of an unwrap of the models of figure 3, each flattened as `unwrap` does it (by landmarks; the paper's preset with all vertices
+The charts of an unwrap without coarse mesh and merging of the models of figure 3, each flattened as `unwrap` does it (by landmarks; the paper's preset with all vertices
 together up to 2,000). Flips and times are sums, the others means weighted by vertices.
 
 {compare.chart_table(charts)}

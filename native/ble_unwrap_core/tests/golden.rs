@@ -36,7 +36,7 @@ static ROWS: [Row; 17] = [
     row("cone", [1, 1], 1.01, 0.72, 0.55),
     row("torus", [1, 1], 1.04, 1.89, 0.39),
     row("plate with five holes", [1, 1], 1.06, 4.10, 0.30),
-    row("Moebius strip", [1, 1], 1.001, 0.34, 0.15),
+    row("Moebius strip", [2, 2], 1.001, 0.64, 0.52),
     row("Klein bottle", [1, 1], 1.04, 1.90, 0.55),
     row("face", [1, 1], 1.04, 0.0, 0.73),
     row("small sculpt", [2, 8], 1.1, 5.8, 0.6),
