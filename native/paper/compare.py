@@ -104,8 +104,7 @@ def charts_of(mesh, **settings):
 
 
 def compare_charts(mesh, methods=None):
-    """The charts of an unwrap by each method: cut on the mesh itself and not merged, as the paper has them, since a chart
-    that has been joined began with other maps."""
+    """The charts of an unwrap by each method: not merged, since a chart that has been joined began with other maps."""
     _, charts = charts_of(mesh, coarse=False, merge=False)
     return compare_patches(charts, methods or CHART_METHODS)
 
