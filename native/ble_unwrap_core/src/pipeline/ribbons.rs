@@ -1,7 +1,7 @@
 //! Charts too long for the texture, cut across.
 //!
-//! A ring or a coil unrolls to a ribbon: one chart, hardly stretched, and a texture as long as the ribbon is all but empty.
-//! A few cuts across it, each as short as the ribbon is narrow, let the texture be filled.
+//! A ring or a coil unrolls to a ribbon, a frame to a spider: one chart, hardly stretched, and a texture large enough to hold
+//! it is all but empty. A few cuts across, each as short as the chart is narrow there, let the texture be filled.
 
 use std::f64::consts::PI;
 
@@ -17,13 +17,13 @@ use super::flatten;
 use super::memo::Run;
 use super::rungs::{Rung, Rungs};
 
-/// A chart that by its length alone keeps the atlas from filling this share of the texture is cut,
-const LEAST_FILL: f64 = 0.25;
-/// and so are its parts until they let it fill this, as far as length goes.
+/// A chart is cut if a texture that holds it, whatever its turn, can be filled to no more than this share by all charts,
+const LEAST_FILL: f64 = 0.3;
+/// and so are its parts, until it can be filled to this.
 const GOOD_FILL: f64 = 0.6;
 /// The cut runs in so much of the length around the middle.
 const MIDDLE: [f64; 2] = [0.4, 0.6];
-/// Directions in which length is measured.
+/// Turns tried, of a half one.
 const DIRECTIONS: usize = 24;
 /// Cuts in two, one after the other, that a part comes out of at most.
 const MOST_CUTS: usize = 6;
@@ -36,26 +36,23 @@ pub(super) fn cut(
     rungs: &mut Rungs,
     progress: &Run<'_>,
 ) -> Result<Vec<Chart>, Cancelled> {
-    let (width, height) = (f64::from(settings.packing.width), f64::from(settings.packing.height));
     let area: f64 = charts.iter().map(|c| c.patch.area()).sum();
-    // A chart as long as the texture's diagonal.
-    let longest = |fill: f64| (area * (width * width + height * height) / (width * height * fill)).sqrt();
-    let (too_long, good) = (longest(LEAST_FILL), longest(GOOD_FILL));
+    let texture = [settings.packing.width, settings.packing.height].map(f64::from);
+    let most_filled = |uv: &[Point2<f64>]| area / (texture[0] * texture[1] * hold(uv, texture).powi(2));
     let mut done = Vec::new();
     for chart in charts {
         progress.check()?;
-        if length(&chart.uv).0 <= too_long {
+        if most_filled(&chart.uv) > LEAST_FILL {
             done.push(chart);
             continue;
         }
         let mut open = vec![(chart, 0)];
         while let Some((chart, cuts)) = open.pop() {
-            let (length, along) = length(&chart.uv);
-            if length <= good || cuts == MOST_CUTS {
+            if most_filled(&chart.uv) > GOOD_FILL || cuts == MOST_CUTS {
                 done.push(chart);
                 continue;
             }
-            match halves(&chart, along, settings, rungs, progress)? {
+            match halves(&chart, settings, rungs, progress)? {
                 Some(parts) => {
                     rungs.take(Rung::Split);
                     open.extend(parts.into_iter().map(|part| (part, cuts + 1)));
@@ -68,15 +65,32 @@ pub(super) fn cut(
     Ok(done)
 }
 
-/// The greatest extent of points, and the direction of it.
-fn length(uv: &[Point2<f64>]) -> (f64, Vector2<f64>) {
-    let extent = |k: usize| {
-        let angle = PI * k as f64 / DIRECTIONS as f64;
-        let along = Vector2::new(angle.cos(), angle.sin());
-        let (low, high) = range(uv, along);
-        (high - low, along)
+/// By how much a texture of this width and height must be enlarged to hold points, turned as suits them best.
+fn hold(uv: &[Point2<f64>], [width, height]: [f64; 2]) -> f64 {
+    directions()
+        .map(|along| {
+            let across = Vector2::new(-along.y, along.x);
+            (extent(uv, along) / width).max(extent(uv, across) / height)
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// The direction in which points extend furthest.
+fn longest(uv: &[Point2<f64>]) -> Vector2<f64> {
+    let further = |best: (f64, Vector2<f64>), along| {
+        let extent = extent(uv, along);
+        if extent > best.0 { (extent, along) } else { best }
     };
-    (0..DIRECTIONS).map(extent).fold((0.0, Vector2::x()), |best, next| if next.0 > best.0 { next } else { best })
+    directions().fold((0.0, Vector2::x()), further).1
+}
+
+fn directions() -> impl Iterator<Item = Vector2<f64>> {
+    (0..DIRECTIONS).map(|k| PI * k as f64 / DIRECTIONS as f64).map(|angle| Vector2::new(angle.cos(), angle.sin()))
+}
+
+fn extent(uv: &[Point2<f64>], along: Vector2<f64>) -> f64 {
+    let (low, high) = range(uv, along);
+    high - low
 }
 
 fn range(uv: &[Point2<f64>], along: Vector2<f64>) -> (f64, f64) {
@@ -88,12 +102,12 @@ fn range(uv: &[Point2<f64>], along: Vector2<f64>) -> (f64, f64) {
 /// A chart cut across near the middle of its length; `None` where that is impossible or takes a part over the limit.
 fn halves(
     chart: &Chart,
-    along: Vector2<f64>,
     settings: &Settings,
     rungs: &mut Rungs,
     progress: &Run<'_>,
 ) -> Result<Option<Vec<Chart>>, Cancelled> {
     let (patch, uv) = (&chart.patch, &chart.uv);
+    let along = longest(uv);
     let (low, high) = range(uv, along);
     let at = |f: &FaceId| {
         let sum: f64 = patch.mesh.triangle(*f).iter().map(|v| uv[v.index()].coords.dot(&along)).sum();
