@@ -18,7 +18,7 @@ use super::memo::Run;
 use super::rungs::{Rung, Rungs};
 
 /// A chart is cut if a texture that holds it, whatever its turn, can be filled to no more than this share by all charts,
-const LEAST_FILL: f64 = 0.3;
+const LEAST_FILL: f64 = 0.25;
 /// and so are its parts, until it can be filled to this.
 const GOOD_FILL: f64 = 0.6;
 /// The cut runs in so much of the length around the middle.
