@@ -22,6 +22,9 @@ const LEAST_ANGLES: usize = 3;
 const MOST_ANGLES: usize = 8;
 /// Share of the texture charts cover in the first guess, with half a margin around each.
 const FIRST_FILL: f64 = 0.8;
+/// A search climbs from where it begins, and may end on a hill: each is made from so many densities, relative to the first
+/// guess. Of twelve atlases the second one improved eight, by up to a quarter.
+const BEGINNINGS: [f64; 2] = [1.0, 0.9];
 /// Vertices of outlines are moved together on a lattice of so many cells of the coarse grid.
 const COARSENED: f64 = 0.3;
 /// Attempts of the search on the fine grid, where no sketch could be refined.
@@ -55,7 +58,7 @@ struct Effort {
     across: f64,
     least: f64,
     most: f64,
-    /// Attempts on the coarse grid.
+    /// Attempts on the coarse grid, from each beginning.
     attempts: usize,
     /// Sketches refined.
     sketches: usize,
@@ -68,7 +71,7 @@ impl Effort {
         // A few charts have few orders and many poses, and an attempt costs next to nothing.
         let attempts = |all: usize, least, most| (all / charts.max(1)).clamp(least, most);
         match quality {
-            Quality::Fast => vec![Self { attempts: attempts(600, 30, 60), sketches: 6, ..grid }],
+            Quality::Fast => vec![Self { attempts: attempts(1200, 60, 120), sketches: 6, ..grid }],
             Quality::High => {
                 let (attempts, sketches) = (attempts(20_000, 80, 400), 16);
                 let finer = Self { across: 50.0, least: 384.0, most: 2048.0, attempts, sketches };
@@ -141,9 +144,13 @@ pub(super) fn densest(
             budget: effort.attempts,
             ..fine
         };
-        let found = search.run(guess, ceiling)?;
-        trials.attempts += found.attempts;
-        sketches.extend(most_promising(found.sketches, effort.sketches));
+        let mut found = Vec::new();
+        for share in BEGINNINGS {
+            let search = search.run(share * guess, ceiling)?;
+            trials.attempts += search.attempts;
+            found.extend(search.sketches);
+        }
+        sketches.extend(most_promising(found, effort.sketches));
     }
     let mut refinement = Refinement::new(outlines, grid, ceiling, settings, progress);
     let refined = refinement.best_of(&sketches)?;

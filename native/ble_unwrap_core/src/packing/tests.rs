@@ -326,12 +326,12 @@ fn few_charts_are_turned_to_fit() {
 
 #[test]
 fn effort_is_bounded() {
-    // Trials, not time: 62, 40, 36 and 672 attempts, 8 or 9 and some dozen placements when this was written.
+    // Trials, not time: 158, 128, 124 and 1140 attempts, 8, 13, 14 and 54 placements when this was written.
     for (count, quality, attempts, placements) in [
-        (2, Quality::Fast, 90, 25),
-        (30, Quality::Fast, 60, 25),
-        (250, Quality::Fast, 60, 25),
-        (12, Quality::High, 1000, 150),
+        (2, Quality::Fast, 240, 25),
+        (30, Quality::Fast, 180, 25),
+        (250, Quality::Fast, 180, 25),
+        (12, Quality::High, 1700, 150),
     ] {
         let charts = mixture(count, 2);
         let settings = PackSettings { quality, ..square(1024, 2.0) };
