@@ -272,7 +272,7 @@ pub enum PackError {
 ///
 /// An item without triangles gets a pose in the middle of the texture and takes no room.
 ///
-/// Cost: O(t log t) for t triangles, then a bounded number of attempts on the coarse grid (twice 60 to 120 once
+/// Cost: O(t log t) for t triangles, then a bounded number of attempts on the coarse grid (twice 40 to 80 once
 /// one fits, `Fast`) and of placements on the fine one (a dozen or two). Measured on two cores: 0.05 to 0.1 s for
 /// 2 to 40 charts, 0.2 to 0.3 s for 170. Attempts and rasters run in parallel. A single chart is fitted without a search.
 ///

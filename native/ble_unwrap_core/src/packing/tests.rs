@@ -326,7 +326,7 @@ fn few_charts_are_turned_to_fit() {
 
 #[test]
 fn effort_is_bounded() {
-    // Trials, not time: 158, 128, 124 and 1140 attempts, 8, 13, 14 and 54 placements when this was written.
+    // Trials, not time: some 80 to 110 and 1140 attempts, a dozen and 54 placements when this was written.
     for (count, quality, attempts, placements) in [
         (2, Quality::Fast, 240, 25),
         (30, Quality::Fast, 180, 25),
