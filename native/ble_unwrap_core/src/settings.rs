@@ -60,7 +60,8 @@ pub struct Settings {
     /// vertices of the input is then a seam only if the result says so. Turn it on for data that
     /// repeats vertices along seams of its own, as many file formats do.
     pub weld: bool,
-    /// Whether large components are cut on a coarse mesh first.
+    /// Whether large components are cut on a coarse mesh first. Off, as in the paper's presets, patches are embedded by all
+    /// landmarks and ribbons stay whole, too.
     pub coarse: bool,
     /// Whether neighbouring charts are joined again where their union stays under the limit.
     pub merge: bool,
