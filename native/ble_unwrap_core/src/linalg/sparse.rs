@@ -164,8 +164,9 @@ impl RoughCholesky {
         self.residual.copy_from_slice(x);
         x.fill(0.0);
         let target = RESIDUAL * RESIDUAL * dot(&self.residual, &self.residual);
-        let mut before = 0.0;
-        for step in 0..MOST_STEPS {
+        self.search.fill(0.0);
+        let mut before = f64::INFINITY;
+        for _ in 0..MOST_STEPS {
             // The preconditioned residual, in `image` until the search direction has it.
             for (c, r) in self.column.iter_mut().zip(&self.residual) {
                 *c = *r as f32;
@@ -178,9 +179,9 @@ impl RoughCholesky {
             if !(now > 0.0 && now.is_finite()) {
                 break;
             }
-            let share = if step == 0 { 0.0 } else { now / before };
+            let share = now / before;
             for (s, i) in self.search.iter_mut().zip(&self.image) {
-                *s = i + if step == 0 { 0.0 } else { share * *s };
+                *s = i + share * *s;
             }
             before = now;
             self.pattern.multiply(values, &self.search, &mut self.image);
