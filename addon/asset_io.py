@@ -38,9 +38,9 @@ def new_scene():
 def _replace_scene(operator):
     """Runs an operator that frees the scene, and leaves nothing behind that names the one freed.
 
-    Before Blender 5, whoever reads `bpy.context.tool_settings` makes the scene the owner of `bpy.context` itself, even
-    when the scene is gone: the next property set through the context, as the glTF exporter sets the window's scene,
-    then tags freed memory. Reading the settings anew names the scene that is there now.
+    In Blender 4.2 (5.0 has mended it) whoever reads `bpy.context.tool_settings` makes the scene the owner of
+    `bpy.context` itself, even when the scene is gone: the next property set through the context, as the glTF exporter
+    sets the window's scene, then tags freed memory. Reading the settings anew names the scene that is there now.
     """
     owned = bpy.context.id_data is not None
     done = operator()

@@ -50,8 +50,9 @@ impl Piece {
     }
 }
 
-/// Sews charts together, longest seam first, where they fit and stay under the limit. The charts are made of faces of `mesh`. Sorted by lowest face. Each chart takes part in at most [`MOST_FAILURES`]
-/// failed trials, so the number of trials is linear in the number of charts.
+/// Sews charts together, longest seam first, where they fit and stay under the limit. The charts are made of faces of
+/// `mesh`. Sorted by lowest face. Each chart takes part in at most [`MOST_FAILURES`] failed trials, so the number of trials
+/// is linear in the number of charts.
 pub(super) fn sew(
     mesh: &TriMesh,
     polygon: &[u32],

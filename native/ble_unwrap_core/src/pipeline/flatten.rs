@@ -145,10 +145,7 @@ pub(super) fn polish(
     progress: &Run<'_>,
 ) -> Result<Polished, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
-    if let Some(flat) = isometric_of(patch, &trial.steps.rest, rungs) {
-        return Ok(Polished::Flat(flat));
-    }
-    trial.polish_or_not(start, rung, rungs)
+    trial.isometric_or(rungs, |rungs| trial.polish_or_not(start, rung, rungs))
 }
 
 /// Flattens the union of charts from where their faces are drawn, side by side in the plane: what does not meet is spread
@@ -161,13 +158,10 @@ pub(super) fn sewn(
     progress: &Run<'_>,
 ) -> Result<Polished, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
-    if let Some(flat) = isometric_of(patch, &trial.steps.rest, rungs) {
-        return Ok(Polished::Flat(flat));
-    }
-    match stretch::stitch(&patch.mesh, &trial.steps.rest, drawn) {
+    trial.isometric_or(rungs, |rungs| match stretch::stitch(&patch.mesh, &trial.steps.rest, drawn) {
         Ok(start) => trial.polish_or_not(&start, Rung::Sewn, rungs),
         Err(_) => Ok(Polished::BadStart),
-    }
+    })
 }
 
 /// A part of a chart, where it lies if that is under the limit, and else minimised by itself. `None` where that is over it,
@@ -302,6 +296,18 @@ impl<'a> Trial<'a> {
             }
         }
         self.flatten_apart(limit, rungs)
+    }
+
+    /// The isometric map if there is one, which needs no start.
+    fn isometric_or(
+        &self,
+        rungs: &mut Rungs,
+        otherwise: impl FnOnce(&mut Rungs) -> Result<Polished, Cancelled>,
+    ) -> Result<Polished, Cancelled> {
+        match isometric_of(self.patch, &self.steps.rest, rungs) {
+            Some(flat) => Ok(Polished::Flat(flat)),
+            None => otherwise(rungs),
+        }
     }
 
     /// As [`Trial::polish`]; a patch that defeats a solver has a bad start.

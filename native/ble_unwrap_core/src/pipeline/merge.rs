@@ -73,8 +73,8 @@ impl Candidate {
 }
 
 /// Joins neighbouring charts, longest shared border over √(smaller area) first (guides count little), as long as the union
-/// is under the limit. Each chart takes part in at most [`MOST_FAILURES`] failed tests, so the number of
-/// tests is linear in the number of charts. Two halves of a split in two are not tried: their union has
+/// is under the limit. Each chart takes part in at most [`MOST_FAILURES`] failed tests, and
+/// [`MOST_EMBEDDED`] from an embedding, so the number of tests is linear in the number of charts. Two halves of a split in two are not tried: their union has
 /// already been refused.
 pub(super) fn merge(
     mesh: &TriMesh,
