@@ -7,59 +7,39 @@ Generated families from 1,000 faces on, doubling, and models: those given (.obj,
 reports: that something took long is no failure, that an unwrap failed is.
 """
 
+# ruff: noqa: E402
+
 import argparse
 import json
-import os
-import platform
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
-import numpy as np
+REPO = Path(__file__).resolve().parent.parent.parent
+sys.path.append(str(REPO / "native" / "paper"))
+
+import machine
+import own_process
 import scaling_meshes
 import scaling_report
 
-HERE = Path(__file__).resolve().parent
-REPO = HERE.parent.parent
 DEVELOPMENT_MODELS = REPO.parent / "shared" / "models"
 SMALLEST = 1_000
 LARGEST = 1_024_000
 # Meshes of many parts stop here: their charts are as many as the parts.
 LARGEST_OF_PARTS = 256_000
 RUNS_OF_SMALL = 3
-SECONDS_AT_MOST = 3600
-
-
-class Failed(Exception):
-    """An unwrap did not end well; the text is its own."""
-
-
-def run(directory, *arguments):
-    """What one process measured."""
-    command = [sys.executable, HERE / "one_run.py", directory, *arguments]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=SECONDS_AT_MOST)
-    except subprocess.TimeoutExpired as error:
-        raise Failed(f"not done in {SECONDS_AT_MOST} s") from error
-    if done.returncode:
-        lines = done.stderr.strip().splitlines()
-        raise Failed(lines[-1] if lines else f"exit code {done.returncode}")
-    return json.loads(done.stdout.splitlines()[-1])
 
 
 def measured(mesh, family, threads):
     """The row of a mesh: several runs of a small one, of which the least count, as what they take varies upwards."""
     row = {"name": mesh.name, "family": family, "faces": scaling_meshes.triangle_count(mesh)}
-    with tempfile.TemporaryDirectory() as scratch:
-        for name in ("positions", "corner_vertices", "face_offsets"):
-            np.save(Path(scratch) / f"{name}.npy", getattr(mesh, name))
+    with own_process.stored(mesh) as directory:
         arguments = ["--threads", str(threads)]
         try:
-            empty = run(scratch, "--empty", *arguments)
+            empty = own_process.run(directory, "--empty", *arguments)
             runs = RUNS_OF_SMALL if row["faces"] < scaling_report.LARGE else 1
-            found = [run(scratch, *arguments) for _ in range(runs)]
-        except Failed as error:
+            found = [own_process.run(directory, *arguments) for _ in range(runs)]
+        except own_process.Failed as error:
             return {**row, "failed": str(error)}
     least = {key: min(f[key] for f in found) for key in ("cpu", "wall", "peak")}
     # Of a mesh of a few faces the difference may be a page or none: the logarithm needs something.
@@ -80,15 +60,6 @@ def sources(options):
         paths = [path for path in DEVELOPMENT_MODELS.iterdir() if path.name.endswith((".obj", ".ply", ".ply.gz"))]
         paths.sort(key=lambda path: (path.stat().st_size, path.name))
     return found + [("models", lambda path=path: scaling_meshes.read(path)) for path in paths]
-
-
-def machine():
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        name = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        name = platform.processor() or platform.machine()
-    return f"{os.cpu_count()} cores of {name}, {platform.system()}, Python {platform.python_version()}"
 
 
 def main():
@@ -117,7 +88,7 @@ def main():
         )
         print(f"[{number}/{len(todo)}] {said}", flush=True)
         (options.output / "scaling.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    (options.output / "README.md").write_text(scaling_report.page(rows, machine()), encoding="utf-8")
+    (options.output / "README.md").write_text(scaling_report.page(rows, machine.described()), encoding="utf-8")
     scaling_report.plot(rows, options.output / "scaling.png")
     print(
         "", scaling_report.table(rows), "", *scaling_report.verdicts(rows), "", f"written to {options.output}", sep="\n"

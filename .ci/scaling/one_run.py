@@ -16,7 +16,9 @@ from pathlib import Path
 import ble_unwrap_native
 import numpy as np
 
-SHOWN = ("charts", "l2", "l2_worst_chart", "flips", "overlaps")
+SHOWN = (
+    "charts", "l2", "l2_worst_chart", "l_infinity", "seam_length", "packing_efficiency", "flips", "overlaps",
+)  # fmt: skip
 
 
 def peak_bytes():

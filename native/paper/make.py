@@ -12,8 +12,6 @@ package.
 
 import argparse
 import json
-import os
-import platform
 import shutil
 import subprocess
 import sys
@@ -28,6 +26,7 @@ import ble_unwrap_native as ble
 import compare
 import figures
 import launch
+import machine
 import measure
 import numpy as np
 import page
@@ -127,15 +126,6 @@ def variants(models):
     return rows
 
 
-def machine():
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        name = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        name = platform.processor() or platform.machine()
-    return f"{os.cpu_count()} cores of {name}, {platform.system()}, Python {platform.python_version()}"
-
-
 def main():
     parser = argparse.ArgumentParser(prog="make.py", description="The paper's figures and comparisons.")
     parser.add_argument("models", nargs="*", metavar="MODEL.obj", help="your own instead of the generated ones")
@@ -173,7 +163,7 @@ def main():
     say("trustworthiness")
     trust = measure.trustworthiness_table(400 if options.quick else 1500)
     text = page.text(
-        machine=machine(),
+        machine=machine.described(),
         models=[Path(path).name for path in options.models],
         rendered=(pictures / "figure_3.png").is_file(),
         faces=faces,
