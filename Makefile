@@ -1,11 +1,12 @@
 # make test   everything: Rust, the wheel, Python without Blender, the add-on in every bpy that can be had
 # make demo   unwrap the demonstration meshes and compare with Smart UV Project: out/
 # make bench  times of the stages; make flamegraph where the time of one unwrap goes; make scaling time and memory against faces
+# make quality  charts, stretch, seams, packing and CPU seconds over shuffled triangulations: for before and after a change
 # make contact-sheet  every model under a checker beside its layout, in one picture: out/contact_sheet.png
 # make paper  the paper's figures and its comparison with Isomap, measured anew: out/paper/ and native/paper/
 # Knobs: PYTHON (3.11 or later), CARGO, MESH=file for the demo and the flame graph (.obj), BLENDER=/path/to/blender for a
-# real one instead of bpy, MODELS="a.obj b.obj" for the paper's figure 3 and its table, for the scaling (.ply, .ply.gz, too)
-# and for the contact sheet, COMPARE=smart for a third picture a model there.
+# real one instead of bpy, MODELS="a.obj b.obj" for the paper's figure 3 and its table, for the scaling and the quality (.ply,
+# .ply.gz, too) and for the contact sheet, COMPARE=smart for a third picture a model there, SHUFFLES=4 for the quality.
 
 PYTHON ?= python3
 CARGO ?= cargo
@@ -15,7 +16,7 @@ WHEELS := addon/wheels
 # What the wheel is made of. Official Blender runs on glibc 2.28, which zig links against on any newer system.
 NATIVE := Cargo.toml Cargo.lock $(shell find native -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' 2>/dev/null)
 
-.PHONY: test test-rust test-python test-blender bench flamegraph scaling contact-sheet lint format venv wheel zip demo \
+.PHONY: test test-rust test-python test-blender bench flamegraph scaling quality contact-sheet lint format venv wheel zip demo \
 	paper clean
 
 test: test-rust lint test-python test-blender
@@ -36,6 +37,9 @@ flamegraph:
 
 scaling: $(VENV)/.wheel $(VENV)/.scaling
 	$(BIN)/python .ci/scaling $(MODELS)
+
+quality: $(VENV)/.wheel
+	$(BIN)/python .ci/quality $(MODELS) $(if $(SHUFFLES),--shuffles $(SHUFFLES))
 
 contact-sheet: zip
 	.ci/blender_libraries
