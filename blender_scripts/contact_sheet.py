@@ -15,7 +15,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import launch
 
-ENVIRONMENT = 3
 DEVELOPMENT_MODELS = launch.REPO.parent / "shared" / "models"
 
 
@@ -35,20 +34,10 @@ def main():
         if not Path(model).is_file():
             parser.error(f"{model}: no such file")
     models = [Path(model).resolve() for model in options.models] or development_models()
-    try:
-        archive = launch.find_archive(options.zip)
-        launch.say("Looking for a Blender")
-        blender = launch.find_blender()
-        with launch.Profile(blender) as profile:
-            launch.say(f"Installing {archive.name} into a throw-away profile of {blender.name}")
-            profile.install(archive)
-            arguments = ["-o", Path(options.output).resolve(), *models]
-            if options.compare:
-                arguments += ["--compare", options.compare]
-            return profile.run(launch.SCRIPTS / "contact_sheet_inside.py", *arguments).returncode
-    except launch.Unavailable as error:
-        print(f"contact sheet: {error}", file=sys.stderr)
-        return ENVIRONMENT
+    arguments = ["-o", Path(options.output).resolve(), *models]
+    if options.compare:
+        arguments += ["--compare", options.compare]
+    return launch.run_with_extension("contact_sheet_inside.py", arguments, options.zip)
 
 
 if __name__ == "__main__":

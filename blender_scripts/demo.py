@@ -14,8 +14,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import launch
 
-ENVIRONMENT = 3
-
 
 def main():
     parser = argparse.ArgumentParser(prog="demo.py", description="Unwrap demonstration meshes, or one of your own.")
@@ -28,22 +26,12 @@ def main():
     options = parser.parse_args()
     if options.mesh and not Path(options.mesh).is_file():
         parser.error(f"{options.mesh}: no such file")
-    try:
-        archive = launch.find_archive(options.zip)
-        launch.say("Looking for a Blender")
-        blender = launch.find_blender()
-        with launch.Profile(blender) as profile:
-            launch.say(f"Installing {archive.name} into a throw-away profile of {blender.name}")
-            profile.install(archive)
-            arguments = ["-o", Path(options.output).resolve()]
-            if options.mesh:
-                arguments += ["--mesh", Path(options.mesh).resolve()]
-            if not options.render:
-                arguments.append("--no-render")
-            return profile.run(launch.SCRIPTS / "demo_inside.py", *arguments).returncode
-    except launch.Unavailable as error:
-        print(f"demo: {error}", file=sys.stderr)
-        return ENVIRONMENT
+    arguments = ["-o", Path(options.output).resolve()]
+    if options.mesh:
+        arguments += ["--mesh", Path(options.mesh).resolve()]
+    if not options.render:
+        arguments.append("--no-render")
+    return launch.run_with_extension("demo_inside.py", arguments, options.zip)
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ REPO = Path(__file__).resolve().parent.parent
 SCRIPTS = REPO / "blender_scripts"
 CACHE = REPO / ".cache"
 OLDEST_BLENDER = (4, 2)
+ENVIRONMENT = 3  # exit code where there is no Blender to be had
 # Every bpy is built for one Python.
 PYTHON_OF_BPY = {"4.2": "3.11", "4.5": "3.11", "5.0": "3.11", "5.1": "3.13", "5.2": "3.13"}
 
@@ -165,3 +166,21 @@ def find_archive(given=None):
     if not archives:
         raise Unavailable("the extension was not built yet: run `make zip` first")
     return archives[-1]
+
+
+def run_with_extension(script, arguments, archive=None):
+    """Runs one of the scripts in a throw-away Blender that the extension is installed in; its exit code.
+
+    Where there is no Blender or no extension to be had, `ENVIRONMENT`; why is printed.
+    """
+    try:
+        archive = find_archive(archive)
+        say("Looking for a Blender")
+        blender = find_blender()
+        with Profile(blender) as profile:
+            say(f"Installing {archive.name} into a throw-away profile of {blender.name}")
+            profile.install(archive)
+            return profile.run(SCRIPTS / script, *arguments).returncode
+    except Unavailable as error:
+        print(f"{Path(sys.argv[0]).stem}: {error}", file=sys.stderr)
+        return ENVIRONMENT
