@@ -145,7 +145,7 @@ pub(super) fn polish(
     progress: &Run<'_>,
 ) -> Result<Polished, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
-    trial.isometric_or(rungs, |rungs| trial.polish_or_not(start, rung, rungs))
+    trial.isometric_or(rungs, |rungs| trial.polish_or_not(start, settings.stretch_limit, rung, rungs))
 }
 
 /// Flattens the union of charts from where their faces are drawn, side by side in the plane: what does not meet is spread
@@ -159,13 +159,13 @@ pub(super) fn sewn(
 ) -> Result<Polished, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
     trial.isometric_or(rungs, |rungs| match stretch::stitch(&patch.mesh, &trial.steps.rest, drawn) {
-        Ok(start) => trial.polish_or_not(&start, Rung::Sewn, rungs),
+        Ok(start) => trial.polish_or_not(&start, settings.stretch_limit, Rung::Sewn, rungs),
         Err(_) => Ok(Polished::BadStart),
     })
 }
 
-/// A part of a chart, where it lies if that is under the limit, and else minimised by itself. `None` where that is over it,
-/// too: a chart's stretch is a mean over its parts.
+/// A part of a chart, where it lies if that is under the limit of single charts, and else minimised by itself. `None` where
+/// that is over it, too: a chart's stretch is a mean over its parts.
 pub(super) fn part_of_chart(
     patch: &Patch,
     start: Positions,
@@ -174,10 +174,12 @@ pub(super) fn part_of_chart(
     progress: &Run<'_>,
 ) -> Result<Option<Flat>, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
-    if let Some(flat) = trial.judge(start.clone(), Some(settings.chart_limit())) {
+    // Under a limit over the atlas, too: the parts together are stretched no more than the chart was.
+    let limit = settings.chart_limit();
+    if let Some(flat) = trial.judge(start.clone(), Some(limit)) {
         return Ok(Some(flat));
     }
-    Ok(match trial.polish_or_not(&start, Rung::Prolonged, rungs)? {
+    Ok(match trial.polish_or_not(&start, limit, Rung::Prolonged, rungs)? {
         Polished::Flat(flat) => Some(flat),
         Polished::Refused | Polished::BadStart => None,
     })
@@ -311,8 +313,14 @@ impl<'a> Trial<'a> {
     }
 
     /// As [`Trial::polish`]; a patch that defeats a solver has a bad start.
-    fn polish_or_not(&self, start: &[Point2<f64>], rung: Rung, rungs: &mut Rungs) -> Result<Polished, Cancelled> {
-        match self.polish(start, self.settings.stretch_limit, rung, rungs) {
+    fn polish_or_not(
+        &self,
+        start: &[Point2<f64>],
+        limit: f64,
+        rung: Rung,
+        rungs: &mut Rungs,
+    ) -> Result<Polished, Cancelled> {
+        match self.polish(start, limit, rung, rungs) {
             Ok(polished) => Ok(polished),
             Err(StretchError::Cancelled(c)) => Err(c),
             Err(_) => Ok(Polished::BadStart),
@@ -476,5 +484,57 @@ fn recover(result: Result<Option<Flat>, StretchError>) -> Result<Option<Flat>, C
         Ok(flat) => Ok(flat),
         Err(StretchError::Cancelled(c)) => Err(c),
         Err(_) => Ok(None),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Progress;
+    use crate::mesh::test_surfaces;
+    use crate::settings::LimitOver;
+    use nalgebra::Point3;
+
+    /// The cap of a ball down to a height, and its vertices in the plane by direction and angle from the pole, drawn out along
+    /// x.
+    fn cap(down_to: f64, drawn_out: f64) -> (Patch, Positions) {
+        let ball = test_surfaces::sphere(3);
+        let polygon: Vec<u32> = (0..ball.face_count() as u32).collect();
+        let above = |f: &FaceId| ball.triangle_positions(*f).iter().all(|p| p.z > down_to);
+        let patch = Patch::of_surface(&ball, &polygon, ball.faces().filter(above).collect());
+        let place = |p: &Point3<f64>| {
+            let radius = p.z.acos() / p.xy().coords.norm().max(f64::MIN_POSITIVE);
+            Point2::new(drawn_out * radius * p.x, radius * p.y)
+        };
+        let start = patch.mesh.positions().iter().map(place).collect();
+        (patch, start)
+    }
+
+    fn part(patch: &Patch, start: Positions, settings: &Settings) -> Option<f64> {
+        let progress = Progress::new();
+        let run = Run::new(&progress, None);
+        let flat = part_of_chart(patch, start, settings, &mut Rungs::default(), &run).expect("not cancelled")?;
+        assert_eq!(stretch::first_flip(&patch.mesh, &flat.uv), None);
+        Some(flat.l2)
+    }
+
+    #[test]
+    fn a_part_of_a_chart_keeps_one_limit_as_it_lies_and_minimised() {
+        let (patch, start) = cap(-0.1, 3.0);
+        let of_chart = Settings { stretch_limit: 1.01, ..Settings::default() };
+        let of_atlas = Settings { limit_over: LimitOver::Atlas, ..of_chart.clone() };
+        let lying = stretch::l2_of_positions(&patch.mesh, &start, NEGLIGIBLE);
+        assert!(lying > of_atlas.chart_limit(), "{lying}: it has to be minimised");
+        assert_eq!(part(&patch, start.clone(), &of_chart), None);
+        let least = part(&patch, start, &of_atlas).expect("under the limit of single charts");
+        assert!(least > of_atlas.stretch_limit && least <= of_atlas.chart_limit(), "{least}");
+    }
+
+    #[test]
+    fn a_part_of_a_chart_that_is_under_the_limit_stays_where_it_lies() {
+        let (patch, start) = cap(0.7, 1.0);
+        let settings = Settings::default();
+        let lying = stretch::l2_of_positions(&patch.mesh, &start, NEGLIGIBLE);
+        assert_eq!(part(&patch, start, &settings), Some(lying));
     }
 }
