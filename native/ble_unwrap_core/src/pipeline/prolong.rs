@@ -266,3 +266,78 @@ fn on_face(chart: &Chart, f: FaceId, p: &Point3<f64>) -> (f64, Point2<f64>) {
     let place = corners[0] + (corners[1] - corners[0]) * s + (corners[2] - corners[0]) * t;
     (outside.max(0.0), place)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Progress;
+    use crate::mesh::{self, test_surfaces};
+
+    /// A mesh as a patch of itself, every triangle a polygon.
+    fn whole(mesh: &TriMesh) -> Patch {
+        Patch::components(mesh, &(0..mesh.face_count() as u32).collect::<Vec<_>>()).remove(0)
+    }
+
+    fn nearest(mesh: &TriMesh, x: f64, y: f64) -> VertexId {
+        let away = |v: VertexId| (mesh.position(v) - Point3::new(x, y, 0.0)).norm_squared();
+        mesh.vertices().min_by(|&v, &w| away(v).total_cmp(&away(w))).expect("a vertex")
+    }
+
+    /// The surface's vertices that a cut has made two of, and whether it ends in `tip`.
+    fn slit(patch: &Patch, tip: VertexId) -> (usize, bool) {
+        let mut count: HashMap<VertexId, usize> = HashMap::new();
+        patch.vertices.iter().for_each(|v| *count.entry(*v).or_default() += 1);
+        let twice = count.values().filter(|&&n| n == 2).count();
+        let ends = patch.mesh.vertices().filter(|v| patch.vertices[v.index()] == tip).collect::<Vec<_>>();
+        (twice, ends.len() == 1 && patch.mesh.is_boundary_vertex(ends[0]))
+    }
+
+    #[test]
+    fn a_dart_keeps_its_tip_on_the_fine_mesh() {
+        let fine = test_surfaces::grid(40, 40, [1.0, 1.0], 0.0);
+        let coarse = mesh::coarsen(&fine, 120, &Progress::new()).expect("not cancelled");
+        let uncut = whole(&coarse.mesh);
+        let tip = nearest(&coarse.mesh, 0.4, 0.5);
+        let dart = path(&uncut, tip, None, 1.0);
+        assert!(dart.len() > 1, "from the middle to the border");
+        let patch = uncut.cut(&dart);
+        assert_eq!(slit(&patch, tip), (dart.len(), true));
+        let uv = patch.mesh.positions().iter().map(|p| p.xy()).collect();
+        let chart = Chart { patch, uv, l2: 1.0 };
+
+        let local: Vec<FaceId> = coarse.mesh.faces().collect();
+        assert_eq!(coarse_cuts(&coarse, &chart, &local, |_| false).tips, [tip]);
+        let part = whole(&fine);
+        let Prolonged { patch, start } = prolong(&coarse, &chart, &part, |_| false).expect("it lies on the chart");
+        assert!(patch.mesh.topology().is_disk());
+        let (twice, ends) = slit(&patch, coarse.source[tip.index()]);
+        assert!(ends, "the cut ends where the dart does");
+        assert!((10..=40).contains(&twice), "{twice}: 0.4 in steps of 0.025 and their diagonals");
+        for (p, q) in patch.mesh.positions().iter().zip(&start) {
+            assert!((p.xy() - q).norm() < 1e-9, "the map of the sheet is the identity, on either side of the cut");
+        }
+
+        // Where the part is cut already nothing is left to do.
+        let Prolonged { patch, .. } = prolong(&coarse, &chart, &part.cut(&[]), |_| true).expect("as before");
+        assert_eq!(slit(&patch, coarse.source[tip.index()]), (0, false));
+    }
+
+    #[test]
+    fn edges_that_lead_nowhere_are_left_out_but_for_tips() {
+        let mesh = test_surfaces::grid(8, 8, [8.0, 8.0], 0.0);
+        let part = whole(&mesh);
+        let at = |x, y| nearest(&mesh, x, y);
+        let main = path(&part, at(5.0, 3.0), Some(at(0.0, 3.0)), 9.0);
+        let stub = path(&part, at(3.0, 3.0), Some(at(3.0, 6.0)), 9.0);
+        assert_eq!((main.len(), stub.len()), (5, 3));
+        let mut kept = without_stubs(&mesh, [main.clone(), main.clone()].concat(), &[at(5.0, 3.0)]);
+        kept.sort_unstable();
+        assert_eq!(kept.len(), 5, "each edge once");
+        let branched = [main.clone(), stub.clone()].concat();
+        assert_eq!(without_stubs(&mesh, branched.clone(), &[at(5.0, 3.0)]), kept, "a branch without a tip goes");
+        assert_eq!(without_stubs(&mesh, branched.clone(), &[at(5.0, 3.0), at(3.0, 6.0)]).len(), 8, "two darts");
+        assert!(without_stubs(&mesh, branched, &[]).is_empty());
+        let across = path(&part, at(0.0, 3.0), Some(at(8.0, 3.0)), 9.0);
+        assert_eq!(without_stubs(&mesh, across, &[]).len(), 8, "from border to border");
+    }
+}
