@@ -254,3 +254,84 @@ fn independent_pairs(pool: &[Option<Candidate>], borders: &[(usize, usize, f64)]
     }
     pairs
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Progress;
+    use crate::mesh::test_surfaces;
+    use nalgebra::{Point2, Point3};
+
+    /// Waves of the border, so that two that lie on each other cross, and their height.
+    const WAVES: (f64, f64) = (5.0, 0.1);
+
+    /// The cap of a ball above 30° in two halves, each drawn as a disc but for a sector: as they lie, the union would go
+    /// round its pole twice.
+    fn halves_that_do_not_fit() -> (TriMesh, Vec<u32>, Vec<Chart>) {
+        let ball = test_surfaces::sphere(3);
+        let all: Vec<u32> = (0..ball.face_count() as u32).collect();
+        let above = |f: &FaceId| ball.triangle_positions(*f).iter().all(|p| p.z > 0.5);
+        let cap = Patch::of_surface(&ball, &all, ball.faces().filter(above).collect());
+        let polygon: Vec<u32> = (0..cap.mesh.face_count() as u32).collect();
+        let half = |side: f64| {
+            let mine =
+                |f: &FaceId| (cap.mesh.triangle_positions(*f).iter().map(|p| p.x).sum::<f64>() > 0.0) == (side > 0.0);
+            let patch = Patch::of_surface(&cap.mesh, &polygon, cap.mesh.faces().filter(mine).collect());
+            let draw = |p: &Point3<f64>| {
+                let angle = 1.9 * (side * p.y).atan2(side * p.x);
+                let radius = p.xy().coords.norm() * (1.0 + side * WAVES.1 * (WAVES.0 * angle).cos());
+                Point2::new(radius * angle.cos(), radius * angle.sin())
+            };
+            let uv = patch.mesh.positions().iter().map(draw).collect();
+            Chart { patch, uv, l2: 1.0 }
+        };
+        let halves = vec![half(1.0), half(-1.0)];
+        (cap.mesh, polygon, halves)
+    }
+
+    fn merged(family: [Option<u32>; 2], which: Which, settings: &Settings) -> (Vec<Chart>, Rungs) {
+        let (mesh, polygon, charts) = halves_that_do_not_fit();
+        let charting = Charting { charts, family: family.to_vec(), rungs: Rungs::default() };
+        let progress = Progress::new();
+        merge(&mesh, &polygon, charting, which, settings, &Run::new(&progress, None)).expect("not cancelled")
+    }
+
+    #[test]
+    fn charts_that_do_not_fit_as_they_lie_become_one_from_an_embedding() {
+        let (mesh, polygon, charts) = halves_that_do_not_fit();
+        let settings = Settings::default();
+        let progress = Progress::new();
+        let run = Run::new(&progress, None);
+        for chart in &charts {
+            assert!(chart.patch.mesh.topology().is_disk());
+            assert_eq!(crate::stretch::first_flip(&chart.patch.mesh, &chart.uv), None);
+        }
+        let sides = [&charts[0], &charts[1]];
+        let sewn = sew::joined(&mesh, &polygon, sides, &settings, &mut Rungs::default(), &run).expect("not cancelled");
+        assert!(matches!(sewn, Joined::Misfit));
+        let (charts, rungs) = merged([None, None], Which::All, &settings);
+        assert_eq!(charts.len(), 1);
+        assert!(charts[0].l2 > 1.0 && charts[0].l2 <= settings.stretch_limit, "{}", charts[0].l2);
+        assert_eq!(charts[0].patch.faces.len(), mesh.face_count());
+        assert!(crate::stretch::boundary_is_simple(&charts[0].patch.mesh, &charts[0].uv));
+        assert!(rungs.taken().contains(&("merge", 1)));
+    }
+
+    #[test]
+    fn a_union_over_the_limit_stays_two_whatever_its_start() {
+        let tight = Settings { stretch_limit: 1.0005, ..Settings::default() };
+        assert_eq!(merged([None, None], Which::All, &tight).0.len(), 2);
+    }
+
+    #[test]
+    fn on_a_fine_mesh_only_small_unions_are_embedded() {
+        let settings = Settings::default();
+        let faces = halves_that_do_not_fit().0.face_count();
+        let count = |family, most_faces| merged(family, Which::AfterSplits { most_faces }, &settings).0.len();
+        let of_two_splits = [Some(0), Some(1)];
+        assert_eq!(count(of_two_splits, EMBEDDED_SHARE * faces), 1);
+        assert_eq!(count(of_two_splits, EMBEDDED_SHARE * (faces - 1)), 2, "it may be sewn, and that fails");
+        assert_eq!(count([None, None], EMBEDDED_SHARE * faces), 2, "no split has made them");
+        assert_eq!(count([Some(0), Some(0)], EMBEDDED_SHARE * faces), 2, "two halves of a split in two");
+    }
+}
