@@ -10,7 +10,7 @@ use crate::errors::Failure;
 use crate::job::Job;
 use crate::owned_array::Array;
 use crate::report::sums;
-use crate::settings::{self, Call, Function};
+use crate::settings::{self, Function};
 
 /// UVs of a point cloud, and what is known about them.
 ///
@@ -38,42 +38,12 @@ impl PointAtlas {
     }
 }
 
-/// What a call gives: a cloud and how to map it.
-struct Cloud {
-    positions: Vec<[f64; 3]>,
-    neighbours: usize,
-    call: Call,
-}
-
-impl Cloud {
-    fn new(
-        positions: &Bound<'_, PyAny>,
-        neighbours: Option<&Bound<'_, PyAny>>,
-        settings: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<Self> {
-        let call = settings::from_keywords(settings, Function::UnwrapPoints)?;
-        let range = [cloud::LEAST_NEIGHBOURS, cloud::MOST_NEIGHBOURS];
-        let neighbours = neighbours
-            .map_or(Ok(cloud::DEFAULT_NEIGHBOURS), |given| settings::whole("neighbours", given, range, ""))?;
-        let positions = arrays::real_rows(positions, Argument { name: "positions", shape: "(n, 3)" })?;
-        Ok(Self { positions, neighbours, call })
-    }
-
-    fn start(self, job: &Job) -> PyResult<()> {
-        let Self { positions, neighbours, call } = self;
-        job.start(
-            call.threads,
-            move |progress| {
-                cloud::unwrap_points(&positions, neighbours, &call.settings, progress).map_err(Failure::from)
-            },
-            |py, atlas| {
-                let uv = Py::new(py, Array::from_f32_rows(atlas.uv))?;
-                let chart = Py::new(py, Array::from_i32(atlas.chart))?;
-                let report = report_to_dict(py, &atlas.report)?.unbind();
-                Ok(Py::new(py, PointAtlas { uv, chart, report })?.into_any())
-            },
-        )
-    }
+/// An atlas of the core as one of Python.
+fn to_python(py: Python<'_>, atlas: cloud::PointAtlas) -> PyResult<Py<PyAny>> {
+    let uv = Py::new(py, Array::from_f32_rows(atlas.uv))?;
+    let chart = Py::new(py, Array::from_i32(atlas.chart))?;
+    let report = report_to_dict(py, &atlas.report)?.unbind();
+    Ok(Py::new(py, PointAtlas { uv, chart, report })?.into_any())
 }
 
 /// Map a point cloud to the plane under a stretch limit: one UV a point, in charts packed into one atlas.
@@ -137,10 +107,7 @@ pub(crate) fn unwrap_points(
     job: Option<Bound<'_, Job>>,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
-    let cloud = Cloud::new(positions, neighbours, settings)?;
-    let job = Job::given_or_new(py, job)?;
-    cloud.start(job.get())?;
-    job.get().finish(py)
+    submit_unwrap_points(py, positions, neighbours, job, settings)?.get().finish(py)
 }
 
 /// Start ``unwrap_points`` on a thread of its own and return the job at once.
@@ -170,9 +137,16 @@ pub(crate) fn submit_unwrap_points<'py>(
     job: Option<Bound<'py, Job>>,
     settings: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, Job>> {
-    let cloud = Cloud::new(positions, neighbours, settings)?;
+    let call = settings::from_keywords(settings, Function::UnwrapPoints)?;
+    let range = [cloud::LEAST_NEIGHBOURS, cloud::MOST_NEIGHBOURS];
+    let neighbours =
+        neighbours.map_or(Ok(cloud::DEFAULT_NEIGHBOURS), |given| settings::whole("neighbours", given, range, ""))?;
+    let positions = arrays::real_rows(positions, Argument { name: "positions", shape: "(n, 3)" })?;
     let job = Job::given_or_new(py, job)?;
-    cloud.start(job.get())?;
+    let work = move |progress: &_| {
+        cloud::unwrap_points(&positions, neighbours, &call.settings, progress).map_err(Failure::from)
+    };
+    job.get().start(call.threads, work, to_python)?;
     Ok(job)
 }
 

@@ -9,7 +9,7 @@ use crate::errors::Failure;
 use crate::job::Job;
 use crate::owned_array::Array;
 use crate::report;
-use crate::settings::{self, Call, Function};
+use crate::settings::{self, Function};
 
 /// UVs of a mesh, and what is known about them.
 ///
@@ -87,14 +87,6 @@ impl MeshArrays {
     pub(crate) fn vertex_count(&self) -> usize {
         self.positions.len()
     }
-}
-
-fn start(job: &Job, mesh: MeshArrays, call: Call) -> PyResult<()> {
-    job.start(
-        call.threads,
-        move |progress| ble_unwrap_core::unwrap(&mesh.input(), &call.settings, progress).map_err(Failure::from),
-        to_python,
-    )
 }
 
 /// An atlas of the core as one of Python.
@@ -229,11 +221,9 @@ pub(crate) fn unwrap(
     job: Option<Bound<'_, Job>>,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
-    let call = settings::from_keywords(settings, Function::Unwrap)?;
-    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, seams, guides)?;
-    let job = Job::given_or_new(py, job)?;
-    start(job.get(), mesh, call)?;
-    job.get().finish(py)
+    submit_unwrap(py, positions, corner_vertices, face_offsets, corner_triangles, seams, guides, job, settings)?
+        .get()
+        .finish(py)
 }
 
 /// Start ``unwrap`` on a thread of its own and return the job at once.
@@ -267,6 +257,8 @@ pub(crate) fn submit_unwrap<'py>(
     let call = settings::from_keywords(settings, Function::Unwrap)?;
     let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, seams, guides)?;
     let job = Job::given_or_new(py, job)?;
-    start(job.get(), mesh, call)?;
+    let work =
+        move |progress: &_| ble_unwrap_core::unwrap(&mesh.input(), &call.settings, progress).map_err(Failure::from);
+    job.get().start(call.threads, work, to_python)?;
     Ok(job)
 }
