@@ -23,7 +23,8 @@ const MOST_ANGLES: usize = 8;
 /// Share of the texture charts cover in the first guess, with half a margin around each.
 const FIRST_FILL: f64 = 0.8;
 /// A search climbs from where it begins, and may end on a hill: each is made from so many densities, relative to the first
-/// guess. Of thirteen atlases the second one improved eight, by up to a fifth, and harmed one.
+/// guess. Of thirteen atlases the second one improved eight, by up to a fifth, and harmed one; packing of the meshes of
+/// `make quality` rises from 0.558 to 0.560 with it, in the same time.
 const BEGINNINGS: [f64; 2] = [1.0, 0.9];
 /// Vertices of outlines are moved together on a lattice of so many cells of the coarse grid.
 const COARSENED: f64 = 0.3;

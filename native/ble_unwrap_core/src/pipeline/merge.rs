@@ -18,7 +18,8 @@ use super::sew::{self, Joined};
 
 /// Failed unions a chart may take part in before it is left alone.
 const MOST_FAILURES: usize = 4;
-/// Failed embeddings of unions that could not be sewn, likewise.
+/// Failed embeddings of unions that could not be sewn, likewise. In the geometric mean over the meshes of `make quality` none
+/// gives 2.72 charts, one or two 2.56, four 2.55, in 0.43, 0.46 and 0.49 CPU seconds.
 const MOST_EMBEDDED: usize = 2;
 /// On a fine mesh only unions of so many times fewer faces than may be sewn are embedded, which costs as many times more.
 const EMBEDDED_SHARE: usize = 5;
