@@ -61,10 +61,10 @@ pub fn cut_to_disk(
     })
 }
 
-/// The shortest path along edges from a vertex to the nearest vertex of a boundary, over edges that
-/// are not forbidden, as half-edges in order: the dart from a point of great stretch. None if no
-/// boundary can be reached; empty if `from` lies on one. All vertices before the last are inside, so a
-/// chart cut along it remains one. Time grows with the part nearer to `from` than the boundary, plus one
+/// The shortest path by `weight` along edges from a vertex to the nearest vertex of a boundary, or to `root` where that is
+/// nearer, over edges that are not forbidden, as half-edges in order: a dart. None if
+/// neither can be reached; empty if `from` is one. All vertices before the last are inside, so a
+/// chart cut along it remains one. `weight` as for [`cut_open`]. Time grows with the part nearer to `from` than the boundary, plus one
 /// pass over two arrays.
 ///
 /// # Panics
@@ -72,6 +72,8 @@ pub fn cut_to_disk(
 pub fn shortest_path_to_boundary(
     mesh: &TriMesh,
     from: VertexId,
+    root: Option<VertexId>,
+    weight: impl Fn(HalfedgeId) -> f64,
     forbidden: impl Fn(HalfedgeId) -> bool,
 ) -> Option<Vec<HalfedgeId>> {
     let mut distance = vec![f64::INFINITY; mesh.vertex_count()];
@@ -81,7 +83,7 @@ pub fn shortest_path_to_boundary(
     heap.push_or_lower(from.index(), 0.0);
     while let Some((v, here)) = heap.pop() {
         let v = VertexId::new(v);
-        if mesh.is_boundary_vertex(v) {
+        if mesh.is_boundary_vertex(v) || Some(v) == root {
             let mut path = Vec::new();
             let mut at = v;
             while at != from {
@@ -94,7 +96,7 @@ pub fn shortest_path_to_boundary(
         }
         // `v` is inside, so all its edges leave it by a half-edge.
         for h in mesh.outgoing(v) {
-            let (to, d) = (mesh.to(h).index(), here + mesh.edge_length(h));
+            let (to, d) = (mesh.to(h).index(), here + weight(h));
             if d < distance[to] && !forbidden(h) && !forbidden(mesh.twin(h)) {
                 distance[to] = d;
                 parent[to] = h;

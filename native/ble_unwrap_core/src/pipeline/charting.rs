@@ -10,10 +10,11 @@ use crate::geodesics::LandmarkDistances;
 use crate::mesh::{Topology, VertexId};
 use crate::progress::Cancelled;
 use crate::segmentation::{self, Segmentation, SpectralAnalysis};
-use crate::settings::{Holes, Settings};
+use crate::settings::{Holes, NEVER_SEWN, Settings};
 
-use super::flatten::{self, Flat};
+use super::flatten::{self, Flattened, Positions};
 use super::memo::{Fingerprint, Kind, Run};
+use super::relief::Relief;
 use super::rungs::{Rung, Rungs};
 
 /// Patches less planar than this are split before any flattening. Far below what the embedding alone would
@@ -28,6 +29,9 @@ const LEAST_FACES_TO_CUT: usize = 8;
 /// Of landmarks a trial takes one in so many of the bounds set: it only has to begin near the minimum, and on five
 /// development models 24 to 32 gave as many charts as 48 to 64, with a third less time for distances.
 const TRIAL_SHARE: usize = 2;
+
+/// Darts of a chart that is flat, but a little over the limit.
+const LATE_DARTS: usize = 2;
 
 /// A part takes over the distances of the patch it was split from if so many of the landmarks lie in it.
 const LEAST_INHERITED: usize = 16;
@@ -236,20 +240,30 @@ impl<'a> Attempt<'a> {
             if let Some(flat) = flatten::isometric(patch, rungs) {
                 return Ok(Some(flat.into_chart(patch.clone())));
             }
-            let flat = match flatten::projected(patch, self.settings, rungs, self.progress)? {
+            let relief = self.relief(patch);
+            let flattened = match flatten::projected(patch, self.settings, rungs, self.progress)? {
                 Some(verdict) => verdict,
+                None if relief.as_ref().is_some_and(|r| !r.is_promising()) => Flattened::Refused,
                 None => {
                     let (distances, analysis) = self.analysis()?;
                     self.flatten(patch, distances, analysis, rungs)?
                 }
             };
-            if let Some(flat) = flat {
-                return Ok(Some(flat.into_chart(patch.clone())));
+            let chart = match flattened {
+                Flattened::Flat(flat) => return Ok(Some(flat.into_chart(patch.clone()))),
+                Flattened::Near(uv) => self.with_darts(relief, uv, rungs)?,
+                Flattened::Refused => self.relieved(relief, rungs)?,
+            };
+            if chart.is_some() {
+                return Ok(chart);
             }
         }
-        // A closed blob does not flatten from one cut, and a few faces are not worth one.
+        // A few faces are not worth a cut.
         let blob = self.topology.loops == 0 && self.topology.genus() == 0;
-        if self.topology.is_disk() || blob || patch.faces.len() < LEAST_FACES_TO_CUT {
+        if blob {
+            return self.relieved(self.relief(patch), rungs);
+        }
+        if self.topology.is_disk() || patch.faces.len() < LEAST_FACES_TO_CUT {
             return Ok(None);
         }
         let length = |h| patch.mesh.edge_length(h) * patch.mesh.border_cost(h);
@@ -270,9 +284,69 @@ impl<'a> Attempt<'a> {
         if let Some(flat) = flatten::isometric(&open, rungs) {
             return Ok(Some(flat.into_chart(open)));
         }
-        let known = analyse(&open, self.settings, self.progress)?;
-        let (distances, analysis) = &*known;
-        Ok(self.flatten(&open, distances, analysis, rungs)?.map(|flat| flat.into_chart(open)))
+        let relief = self.relief(&open);
+        let flattened = if relief.as_ref().is_some_and(|r| !r.is_promising()) {
+            Flattened::Refused
+        } else {
+            self.embedded(&open, rungs)?
+        };
+        match flattened {
+            Flattened::Flat(flat) => Ok(Some(flat.into_chart(open))),
+            Flattened::Near(uv) => self.with_darts(relief, uv, rungs),
+            Flattened::Refused => self.relieved(relief, rungs),
+        }
+    }
+
+    /// A patch other than the whole, embedded by distances of its own.
+    fn embedded(&self, patch: &Patch, rungs: &mut Rungs) -> Result<Flattened, Cancelled> {
+        let known = analyse(patch, self.settings, self.progress)?;
+        self.flatten(patch, &known.0, &known.1, rungs)
+    }
+
+    /// What darts may do for a patch; `None` if none are wanted.
+    fn relief<'p>(&self, patch: &'p Patch) -> Option<Relief<'p>> {
+        if self.settings.least_sewn < NEVER_SEWN { Relief::of(patch, self.settings.stretch_limit) } else { None }
+    }
+
+    /// A patch cut by darts where it bulges, before it is flattened.
+    fn relieved(&self, relief: Option<Relief<'_>>, rungs: &mut Rungs) -> Result<Option<Chart>, Cancelled> {
+        let Some(open) = relief.and_then(Relief::relieved) else { return Ok(None) };
+        rungs.take(Rung::CutOpen);
+        let flat = match flatten::isometric(&open, rungs) {
+            Some(flat) => flat,
+            None => match self.embedded(&open, rungs)? {
+                Flattened::Flat(flat) => flat,
+                Flattened::Near(uv) => return self.with_darts(self.relief(&open), uv, rungs),
+                Flattened::Refused => return Ok(None),
+            },
+        };
+        rungs.take(Rung::Dart);
+        Ok(Some(flat.into_chart(open)))
+    }
+
+    /// A patch that lies in the plane with a little too much stretch, with a dart, and one more if that helps but does not do.
+    fn with_darts(
+        &self,
+        relief: Option<Relief<'_>>,
+        mut uv: Positions,
+        rungs: &mut Rungs,
+    ) -> Result<Option<Chart>, Cancelled> {
+        let mut relief = relief;
+        for _ in 0..LATE_DARTS {
+            let Some((open, start)) = relief.and_then(|r| r.opened(&uv)) else { break };
+            match flatten::opened(&open, &start, self.settings, self.progress)? {
+                Flattened::Flat(flat) => {
+                    rungs.take(Rung::Dart);
+                    return Ok(Some(flat.into_chart(open)));
+                }
+                Flattened::Near(positions) => {
+                    uv = positions;
+                    relief = Relief::owned(open, self.settings.stretch_limit);
+                }
+                Flattened::Refused => break,
+            }
+        }
+        Ok(None)
     }
 
     fn flatten(
@@ -281,9 +355,9 @@ impl<'a> Attempt<'a> {
         distances: &LandmarkDistances,
         analysis: &SpectralAnalysis,
         rungs: &mut Rungs,
-    ) -> Result<Option<Flat>, Cancelled> {
+    ) -> Result<Flattened, Cancelled> {
         if analysis.planarity < LEAST_PLANARITY {
-            return Ok(None);
+            return Ok(Flattened::Refused);
         }
         flatten::flatten(patch, distances, self.settings, rungs, self.progress)
     }

@@ -41,11 +41,14 @@ const HOPELESS_SEWN: f64 = 2.0;
 const MOST_LEANING: f64 = 70.0;
 
 /// A position in the plane for each vertex.
-type Positions = Vec<Point2<f64>>;
+pub(super) type Positions = Vec<Point2<f64>>;
 
 fn bytes_of_start(start: &Option<Positions>) -> usize {
     16 * start.as_ref().map_or(0, Vec::len)
 }
+
+/// A chart over the limit by so many times at most may come under it by one cut.
+const NEAR: f64 = 1.25;
 
 /// A patch flattened without flips and without overlap.
 pub(super) struct Flat {
@@ -57,6 +60,14 @@ impl Flat {
     pub(super) fn into_chart(self, patch: Patch) -> Chart {
         Chart { patch, uv: self.uv, l2: self.l2 }
     }
+}
+
+/// What came of flattening a patch under a limit.
+pub(super) enum Flattened {
+    Flat(Flat),
+    /// A little over the limit, and where its vertices came to lie.
+    Near(Positions),
+    Refused,
 }
 
 /// Isometric flattening of a planar or developable patch of genus 0 with a boundary; `None` where
@@ -88,28 +99,28 @@ fn l2(patch: &Patch, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
     if true_l2.is_nan() { stretch::l2_stretch(&patch.mesh, rest, uv) } else { true_l2 }
 }
 
-/// Flattens a patch of genus 0 with a boundary by embedding and stretch minimisation. `None` where the
-/// limit is out of reach: the work stops as soon as that is clear.
+/// Flattens a patch of genus 0 with a boundary by embedding and stretch minimisation. The work stops as soon as it is clear
+/// that the limit is out of reach.
 pub(super) fn flatten(
     patch: &Patch,
     distances: &LandmarkDistances,
     settings: &Settings,
     rungs: &mut Rungs,
     progress: &Run<'_>,
-) -> Result<Option<Flat>, Cancelled> {
+) -> Result<Flattened, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
-    recover(trial.flatten(distances, Some(settings.stretch_limit), rungs))
+    recover(trial.flatten(distances, Some(settings.stretch_limit), rungs), Flattened::Refused)
 }
 
 /// Flattens a patch of genus 0 with a boundary from its projection, if it leans so little from its mean plane that this
-/// has no flip and no overlap. The outer `None` if it does not, the inner one where the limit is out of reach: another
-/// start would not help. Costs neither distances nor an embedding.
+/// has no flip and no overlap; `None` if it does not. Where the limit is out of reach another start would not help. Costs
+/// neither distances nor an embedding.
 pub(super) fn projected(
     patch: &Patch,
     settings: &Settings,
     rungs: &mut Rungs,
     progress: &Run<'_>,
-) -> Result<Option<Option<Flat>>, Cancelled> {
+) -> Result<Option<Flattened>, Cancelled> {
     let Some(start) = embedding::project(&patch.mesh, MOST_LEANING) else { return Ok(None) };
     if stretch::first_flip(&patch.mesh, &start).is_some() || !stretch::boundary_is_simple(&patch.mesh, &start) {
         return Ok(None);
@@ -117,12 +128,29 @@ pub(super) fn projected(
     match Trial::new(patch, settings, progress).free(&start, Some(settings.stretch_limit)) {
         Ok(Free::Simple(flat)) => {
             rungs.take(Rung::Projection);
-            Ok(Some(Some(flat)))
+            Ok(Some(Flattened::Flat(flat)))
         }
-        Ok(Free::Refused) => Ok(Some(None)),
+        Ok(Free::Over(near)) => Ok(Some(near.map_or(Flattened::Refused, Flattened::Near))),
         Err(StretchError::Cancelled(c)) => Err(c),
         Ok(Free::Overlaps) | Err(_) => Ok(None),
     }
+}
+
+/// Flattens a patch that has just been cut open, from where it lay before: the cut is given room. Refused where it opens
+/// the wrong way.
+pub(super) fn opened(
+    patch: &Patch,
+    start: &[Point2<f64>],
+    settings: &Settings,
+    progress: &Run<'_>,
+) -> Result<Flattened, Cancelled> {
+    let trial = Trial::new(patch, settings, progress);
+    let flattened = trial.free(start, Some(settings.stretch_limit)).map(|free| match free {
+        Free::Simple(flat) => Flattened::Flat(flat),
+        Free::Over(Some(uv)) => Flattened::Near(uv),
+        Free::Overlaps | Free::Over(None) => Flattened::Refused,
+    });
+    recover(flattened, Flattened::Refused)
 }
 
 /// What came of a start in the plane.
@@ -176,7 +204,7 @@ pub(super) fn part_of_chart(
     let trial = Trial::new(patch, settings, progress);
     // Under a limit over the atlas, too: the parts together are stretched no more than the chart was.
     let limit = settings.chart_limit();
-    if let Some(flat) = trial.judge(start.clone(), Some(limit)) {
+    if let Ok(flat) = trial.judge(start.clone(), Some(limit)) {
         return Ok(Some(flat));
     }
     Ok(match trial.polish_or_not(&start, limit, Rung::Prolonged, rungs)? {
@@ -195,7 +223,7 @@ pub(super) fn flatten_polygon(
     progress: &Run<'_>,
 ) -> Result<Flat, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
-    if let Some(flat) = recover(trial.flatten(distances, None, rungs))? {
+    if let Flattened::Flat(flat) = recover(trial.flatten(distances, None, rungs), Flattened::Refused)? {
         return Ok(flat);
     }
     rungs.take(Rung::TutteCircle);
@@ -211,7 +239,7 @@ pub(super) fn flatten_apart(
     progress: &Run<'_>,
 ) -> Result<Option<Flat>, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
-    recover(trial.flatten_apart(Some(settings.stretch_limit), rungs))
+    recover(trial.flatten_apart(Some(settings.stretch_limit), rungs), None)
 }
 
 /// A patch that is one polygon, too thin or too small for single precision: a triangle at least a
@@ -250,7 +278,15 @@ enum Free {
     Simple(Flat),
     /// Under the limit, but its boundary runs over itself.
     Overlaps,
-    Refused,
+    /// Over the limit; its map, if by little.
+    Over(Option<Positions>),
+}
+
+/// What became of a minimisation.
+enum Descended {
+    AtRest(Minimised),
+    /// It was clear that the limit is out of reach. The map as it was before, or none if nothing was.
+    GivenUp(Positions),
 }
 
 /// The steps on one patch under a limit: the work stops as soon as that is out of reach.
@@ -274,30 +310,32 @@ impl<'a> Trial<'a> {
         distances: &LandmarkDistances,
         limit: Option<f64>,
         rungs: &mut Rungs,
-    ) -> Result<Option<Flat>, StretchError> {
+    ) -> Result<Flattened, StretchError> {
         if let Some(start) = self.embed(distances)? {
             let told_by_folds = limit.is_some() && self.steps.model() != Model::Paper;
             if told_by_folds && self.folded_share(&start) > MOST_FOLDED {
-                return Ok(None);
+                return Ok(Flattened::Refused);
             }
             let cleared = match limit {
                 // Of 29 trials on a body that Tutte's embedding had to save one came under the limit.
                 Some(_) => self.recall_start(Kind::Cleared, &start, || self.steps.clear_flips(&start))?,
                 None => Some(self.steps.remove_flips(&start)?),
             };
-            let Some((uv, rung)) = cleared else { return Ok(None) };
+            let Some((uv, rung)) = cleared else { return Ok(Flattened::Refused) };
             rungs.take(rung);
             if limit.is_some() && stretch::l2_stretch(self.steps.mesh, &self.steps.rest, &uv) > HOPELESS_START {
-                return Ok(None);
+                return Ok(Flattened::Refused);
             }
             match self.free(&uv, limit)? {
-                Free::Simple(flat) => return Ok(Some(flat)),
-                Free::Refused => return Ok(None),
-                Free::Overlaps if self.steps.boundary_is_simple(&uv) => return self.apart(&uv, limit),
+                Free::Simple(flat) => return Ok(Flattened::Flat(flat)),
+                Free::Over(near) => return Ok(near.map_or(Flattened::Refused, Flattened::Near)),
+                Free::Overlaps if self.steps.boundary_is_simple(&uv) => {
+                    return Ok(self.apart(&uv, limit)?.map_or(Flattened::Refused, Flattened::Flat));
+                }
                 Free::Overlaps => {}
             }
         }
-        self.flatten_apart(limit, rungs)
+        Ok(self.flatten_apart(limit, rungs)?.map_or(Flattened::Refused, Flattened::Flat))
     }
 
     /// The isometric map if there is one, which needs no start.
@@ -351,7 +389,7 @@ impl<'a> Trial<'a> {
         if !self.steps.boundary_is_tight(&uv) {
             match self.free(&uv, Some(limit))? {
                 Free::Simple(flat) => return Ok(Polished::Flat(flat)),
-                Free::Refused => return Ok(Polished::Refused),
+                Free::Over(_) => return Ok(Polished::Refused),
                 Free::Overlaps => {}
             }
         }
@@ -360,17 +398,21 @@ impl<'a> Trial<'a> {
 
     /// Minimises from a start without flips, its boundary free.
     fn free(&self, start: &[Point2<f64>], limit: Option<f64>) -> Result<Free, StretchError> {
-        let Some(best) = self.minimise(start, limit, None)? else { return Ok(Free::Refused) };
+        let best = match self.minimise(start, limit, None)? {
+            Descended::AtRest(best) => best,
+            Descended::GivenUp(early) => return Ok(Free::Over(self.near(early, limit))),
+        };
+        let over = |uv| Free::Over(self.near(uv, limit));
         if self.steps.boundary_is_simple(&best.uv) {
-            return Ok(self.judge(best.uv, limit).map_or(Free::Refused, Free::Simple));
+            return Ok(self.judge(best.uv, limit).map_or_else(over, Free::Simple));
         }
-        Ok(if limit.is_some_and(|limit| best.l2 > limit) { Free::Refused } else { Free::Overlaps })
+        Ok(if limit.is_some_and(|limit| best.l2 > limit) { over(best.uv) } else { Free::Overlaps })
     }
 
     /// Minimises from a start whose boundary is simple, and keeps it so.
     fn apart(&self, start: &[Point2<f64>], limit: Option<f64>) -> Result<Option<Flat>, StretchError> {
-        let Some(best) = self.minimise(start, limit, Some(BOUNDARY_REACH))? else { return Ok(None) };
-        Ok(if self.steps.boundary_is_simple(&best.uv) { self.judge(best.uv, limit) } else { None })
+        let Descended::AtRest(best) = self.minimise(start, limit, Some(BOUNDARY_REACH))? else { return Ok(None) };
+        Ok(if self.steps.boundary_is_simple(&best.uv) { self.judge(best.uv, limit).ok() } else { None })
     }
 
     fn flatten_apart(&self, limit: Option<f64>, rungs: &mut Rungs) -> Result<Option<Flat>, StretchError> {
@@ -425,13 +467,18 @@ impl<'a> Trial<'a> {
         mesh.faces().filter(flipped).map(area).sum::<f64>() / stretch::surface_area(rest)
     }
 
-    /// `None` if it was given up.
+    /// A map that is over the limit, if by so little that one cut may do.
+    fn near(&self, uv: Positions, limit: Option<f64>) -> Option<Positions> {
+        let is_near = |limit: f64| stretch::l2_stretch(self.steps.mesh, &self.steps.rest, &uv) <= NEAR * limit;
+        (!uv.is_empty() && limit.is_some_and(is_near)).then_some(uv)
+    }
+
     fn minimise(
         &self,
         start: &[Point2<f64>],
         abandon_above: Option<f64>,
         keep_apart: Option<f64>,
-    ) -> Result<Option<Minimised>, StretchError> {
+    ) -> Result<Descended, StretchError> {
         let input = |f: &mut Fingerprint| {
             f.mesh(self.steps.mesh);
             f.points(start);
@@ -441,7 +488,7 @@ impl<'a> Trial<'a> {
         let given_up = |best: &Minimised| abandon_above.is_some_and(|limit| limit < best.abandoned_below);
         // One that was given up tells nothing about limits that it would have gone on under.
         let will_do = |best: &Minimised| !best.abandoned || given_up(best);
-        let bytes = |best: &Minimised| 16 * best.uv.len();
+        let bytes = |best: &Minimised| 16 * (best.uv.len() + best.early.len());
         let minimise = || {
             let mut best = self.steps.minimise(start, abandon_above, keep_apart)?;
             if best.abandoned {
@@ -450,13 +497,14 @@ impl<'a> Trial<'a> {
             Ok::<_, StretchError>(best)
         };
         let best = self.run.recall_if(Kind::Minimum, input, will_do, bytes, minimise)?;
-        Ok((!given_up(&best)).then(|| (*best).clone()))
+        Ok(if given_up(&best) { Descended::GivenUp(best.early.clone()) } else { Descended::AtRest((*best).clone()) })
     }
 
-    fn judge(&self, uv: Vec<Point2<f64>>, limit: Option<f64>) -> Option<Flat> {
+    /// A chart of this map; the map again where it is over the limit.
+    fn judge(&self, uv: Positions, limit: Option<f64>) -> Result<Flat, Positions> {
         let l2 = l2(self.patch, &self.steps.rest, &uv);
         let good = limit.is_none_or(|limit| l2 <= limit && self.p99_stretch(&uv) <= MOST_P99_STRETCH);
-        good.then_some(Flat { uv, l2 })
+        if good { Ok(Flat { uv, l2 }) } else { Err(uv) }
     }
 
     /// The stretch that 99 % of the area stays under, with the chart at the area of its surface.
@@ -479,11 +527,10 @@ impl<'a> Trial<'a> {
 }
 
 /// A patch that defeats a solver or has no injective map is refused like one that is too stretched.
-fn recover(result: Result<Option<Flat>, StretchError>) -> Result<Option<Flat>, Cancelled> {
+fn recover<T>(result: Result<T, StretchError>, refused: T) -> Result<T, Cancelled> {
     match result {
-        Ok(flat) => Ok(flat),
         Err(StretchError::Cancelled(c)) => Err(c),
-        Err(_) => Ok(None),
+        other => Ok(other.unwrap_or(refused)),
     }
 }
 

@@ -16,6 +16,7 @@ mod flatten;
 mod memo;
 mod merge;
 mod prolong;
+mod relief;
 mod ribbons;
 mod rigid;
 mod rungs;

@@ -48,6 +48,7 @@ pub(super) fn minimise(
         iterations: 0,
         abandoned: false,
         abandoned_below: f64::NEG_INFINITY,
+        early: Vec::new(),
         converged: false,
     };
     for sweep in 0..settings.max_iterations {

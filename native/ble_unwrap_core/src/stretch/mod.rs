@@ -9,13 +9,14 @@
 //! if no face is flipped and the boundary loops are simple ([`boundary_is_simple`]).
 //!
 //! The ways in: [`make_injective`] removes flips, [`minimise_stretch`] lowers the stretch without making
-//! any, [`tutte_embedding`] makes an injective map from nothing, [`first_flip`] and [`boundary_is_simple`] check exactly.
+//! any, [`bulge`] tells where to cut before all that, [`tutte_embedding`] makes an injective map from nothing, [`first_flip`] and [`boundary_is_simple`] check exactly.
 //!
 //! Papers: Sander et al. 2001 (stretch, line searches), Smith and Schaefer 2015 (step limits, boundary
 //! barrier), Smith et al. 2019 (closed-form Hessians), Garanzha et al. 2021 (flips), Tutte 1963 and Floater
 //! 2003 (convex embeddings).
 
 mod barrier;
+mod bulge;
 mod convex_outline;
 mod energy;
 mod foldover_free;
@@ -37,6 +38,7 @@ use nalgebra::Point2;
 use thiserror::Error;
 
 pub use barrier::{BOUNDARY_REACH, boundary_is_tight};
+pub use bulge::{Bulge, bulge};
 pub use injective::{Injective, InjectiveMap, clear_flips, clear_locally, make_injective};
 pub use measure::{
     l2_of_positions, l2_stretch, l2_unsigned, linf_stretch, plane_area, rescale_to_equal_area, surface_area,
@@ -116,6 +118,9 @@ pub struct Minimised {
     /// Under any limit below this it would have been given up, sooner or now, and under no other so far: −∞ where it came
     /// to rest before anything could be told.
     pub abandoned_below: f64,
+    /// The map as it was when it could first have been given up, which does not depend on any limit; empty where it came to
+    /// rest before, or no limit was set.
+    pub early: Vec<Point2<f64>>,
     /// Whether the last iteration gained less than the tolerance.
     pub converged: bool,
 }

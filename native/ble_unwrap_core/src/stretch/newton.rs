@@ -76,6 +76,7 @@ pub(super) fn minimise(
         iterations: 0,
         abandoned: false,
         abandoned_below: f64::NEG_INFINITY,
+        early: Vec::new(),
         converged: false,
     };
     let mut l2 = descent.system.stretch_sums(&descent.uv).l2();
@@ -97,6 +98,9 @@ pub(super) fn minimise(
             break;
         }
         let gain = (l2_before - l2).max(0.0);
+        if iteration == ABANDON_AFTER && options.abandon_above.is_some() {
+            result.early = descent.uv.clone();
+        }
         if iteration >= ABANDON_AFTER {
             let far = if iteration >= FAR_AFTER { l2 / FAR } else { f64::NEG_INFINITY };
             result.abandoned_below = result.abandoned_below.max(l2 - ABANDON_GAINS * gain).max(far);

@@ -180,7 +180,7 @@ fn darts_reach_the_boundary_and_keep_a_chart() {
         mesh.vertices().min_by(|a, b| d(a).total_cmp(&d(b))).expect("a vertex")
     };
     let from = near(0.5, 0.3);
-    let path = shortest_path_to_boundary(&mesh, from, |_| false).expect("a boundary");
+    let path = shortest_path_to_boundary(&mesh, from, None, length, |_| false).expect("a boundary");
     assert!((total(&mesh, &path) - 0.3).abs() < 1e-9);
     assert_eq!(mesh.from(path[0]), from);
     assert!(path.windows(2).all(|w| mesh.to(w[0]) == mesh.from(w[1])));
@@ -189,9 +189,13 @@ fn darts_reach_the_boundary_and_keep_a_chart() {
     assert!(after(&mesh, &cuts).is_disk());
     // Around what is forbidden, or not at all.
     let low = |h: HalfedgeId| mesh.position(mesh.from(h)).y.min(mesh.position(mesh.to(h)).y) < 0.19;
-    let around = shortest_path_to_boundary(&mesh, from, low).expect("the other sides are free");
+    let around = shortest_path_to_boundary(&mesh, from, None, length, low).expect("the other sides are free");
     assert!((total(&mesh, &around) - 0.5).abs() < 1e-9);
-    assert_eq!(shortest_path_to_boundary(&mesh, from, |_| true), None);
-    assert_eq!(shortest_path_to_boundary(&mesh, near(0.0, 0.4), |_| true), Some(vec![]));
-    assert_eq!(shortest_path_to_boundary(&sphere(1), VertexId::new(0), |_| false), None);
+    assert_eq!(shortest_path_to_boundary(&mesh, from, None, length, |_| true), None);
+    assert_eq!(shortest_path_to_boundary(&mesh, near(0.0, 0.4), None, length, |_| true), Some(vec![]));
+    let ball = sphere(1);
+    let [from, root] = [0, ball.vertex_count() - 1].map(VertexId::new);
+    assert_eq!(shortest_path_to_boundary(&ball, from, None, |_| 1.0, |_| false), None);
+    let slit = shortest_path_to_boundary(&ball, from, Some(root), |_| 1.0, |_| false).expect("the root");
+    assert_eq!((ball.from(slit[0]), slit.last().map(|&h| ball.to(h))), (from, Some(root)));
 }

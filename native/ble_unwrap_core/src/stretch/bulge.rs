@@ -1,0 +1,162 @@
+//! Where a surface bulges, and how far from flat that leaves it: told from one linear system, before any map is made.
+//!
+//! A conformal map into the plane scales lengths by e⁻ᵘ, where −Δu is the Gaussian curvature and u = 0 on a free
+//! boundary. Where u peaks there is more surface than its surroundings leave room for, and a cut from there to the boundary
+//! gives it room: so M. Ben-Chen, C. Gotsman, G. Bunin place their cones (Conformal flattening by curvature prescription and
+//! metric scaling, Eurographics 2008). And the spread of u tells the stretch of that map, which is little more than the least.
+
+use std::f64::consts::TAU;
+
+use crate::distortion::RestTriangle;
+use crate::linalg::{SparseCholesky, SparseError, SparsePattern};
+use crate::mesh::{HalfedgeId, TriMesh, VertexId, measure};
+
+/// Cotangent weights are kept within these bounds: positive, so that u peaks only where there is curvature.
+const WEIGHTS: (f64, f64) = (0.05, 20.0);
+/// Peaks below this (in u: a part in a hundred of length) are no bulge.
+const LEAST_PEAK: f64 = 0.01;
+
+/// How a surface bulges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bulge {
+    /// L2 stretch of the conformal map with a free boundary, at its best scale, to first order in the curvature.
+    pub l2: f64,
+    /// The inner vertex where that map shrinks most; none where it shrinks nowhere, as in planes, rolls and saddles.
+    pub tip: Option<VertexId>,
+    /// On a closed surface its sharpest vertex, where the map is held in place of a boundary.
+    pub root: Option<VertexId>,
+}
+
+/// How a connected surface bulges. `rest` holds the triangle of each face. Not guaranteed: that a map of this stretch does
+/// not overlap itself. O(n^1.5).
+///
+/// # Errors
+/// [`SparseError`] where the system cannot be factored.
+pub fn bulge(mesh: &TriMesh, rest: &[RestTriangle]) -> Result<Bulge, SparseError> {
+    let n = mesh.vertex_count();
+    let defect = angle_defects(mesh);
+    let is_closed = mesh.halfedges().all(|h| !mesh.is_boundary(h));
+    let sharpest =
+        || mesh.vertices().max_by(|a, b| defect[a.index()].total_cmp(&defect[b.index()]).then_with(|| b.cmp(a)));
+    let root = if is_closed { sharpest() } else { None };
+    let is_free: Vec<bool> = mesh.vertices().map(|v| !mesh.is_boundary_vertex(v) && Some(v) != root).collect();
+
+    let weights: Vec<[f64; 3]> = rest.iter().map(|r| r.cotangents().map(|w| w.clamp(WEIGHTS.0, WEIGHTS.1))).collect();
+    let weight = |h: HalfedgeId| weights[h.face().index()][h.slot()];
+    let inner =
+        || mesh.edges().filter(|&h| !mesh.is_boundary(h)).map(|h| (h, mesh.from(h).index(), mesh.to(h).index()));
+    let pairs = inner().filter(|e| is_free[e.1] && is_free[e.2]).map(|e| (e.1 as u32, e.2 as u32));
+    let mut solver = SparseCholesky::analyse(SparsePattern::from_pairs(n, pairs))?;
+    let mut values = vec![0.0; solver.pattern().entry_count()];
+    for v in (0..n).filter(|&v| !is_free[v]) {
+        values[solver.pattern().diagonal(v)] = 1.0;
+    }
+    for (h, i, j) in inner() {
+        let w = weight(h) + weight(mesh.twin(h));
+        for v in [i, j].into_iter().filter(|&v| is_free[v]) {
+            values[solver.pattern().diagonal(v)] += w;
+        }
+        if is_free[i]
+            && is_free[j]
+            && let Some(at) = solver.pattern().position(i, j)
+        {
+            values[at] -= w;
+        }
+    }
+    let mut u: Vec<f64> = defect.iter().zip(&is_free).map(|(&d, &free)| if free { d } else { 0.0 }).collect();
+    solver.refactor(&values)?;
+    solver.solve_in_place(&mut u);
+
+    let peak = mesh.vertices().max_by(|a, b| u[a.index()].total_cmp(&u[b.index()]).then_with(|| b.cmp(a)));
+    let (mut surface, mut grown, mut shrunk) = (0.0, 0.0, 0.0);
+    for (f, r) in mesh.faces().zip(rest) {
+        for v in mesh.triangle(f) {
+            let squared = (2.0 * u[v.index()]).exp();
+            surface += r.area();
+            grown += r.area() * squared;
+            shrunk += r.area() / squared;
+        }
+    }
+    Ok(Bulge { l2: (grown * shrunk).sqrt() / surface, tip: peak.filter(|v| u[v.index()] > LEAST_PEAK), root })
+}
+
+/// 2π less the angles around each vertex.
+fn angle_defects(mesh: &TriMesh) -> Vec<f64> {
+    let mut defect = vec![TAU; mesh.vertex_count()];
+    for f in mesh.faces() {
+        let [a, b, c] = mesh.triangle_positions(f);
+        for (v, corner) in mesh.triangle(f).iter().zip([[a, b, c], [b, c, a], [c, a, b]]) {
+            defect[v.index()] -= measure::corner_angle(corner);
+        }
+    }
+    defect
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::test_surfaces;
+    use crate::stretch::test_meshes::grid;
+    use nalgebra::Point3;
+
+    fn of(mesh: &TriMesh) -> Bulge {
+        bulge(mesh, &RestTriangle::of_mesh(mesh)).expect("factored")
+    }
+
+    fn relief(height: impl Fn(f64, f64) -> f64) -> (Bulge, Option<(f64, f64)>) {
+        let mesh = grid(30, 20, |x, y| Point3::new(x, y, height(x, y)));
+        let found = of(&mesh);
+        (found, found.tip.map(|v| mesh.positions()[v.index()]).map(|p| (p.x, p.y)))
+    }
+
+    #[test]
+    fn a_bump_is_found_wherever_it_is_and_a_cone_at_its_tip() {
+        let bump = |x0: f64, y0: f64| relief(move |x, y| 6.0 * (-((x - x0).powi(2) + (y - y0).powi(2)) / 12.0).exp());
+        for (x0, y0) in [(8.0, 10.0), (20.0, 7.0)] {
+            let (found, tip) = bump(x0, y0);
+            let (x, y) = tip.expect("a bulge");
+            assert!((x - x0).abs() <= 2.0 && (y - y0).abs() <= 2.0, "{x} {y}");
+            assert!(found.l2 > 1.2 && found.root.is_none(), "{found:?}");
+        }
+        let cone = |x: f64, y: f64| -2.0 * ((x - 11.0).powi(2) + (y - 9.0).powi(2)).sqrt();
+        assert_eq!(relief(cone).1, Some((11.0, 9.0)));
+    }
+
+    #[test]
+    fn planes_rolls_and_saddles_do_not_bulge() {
+        for found in
+            [relief(|_, _| 0.0), relief(|x, _| 3.0 * (0.3 * x).sin()), relief(|x, y| 0.05 * (x - 15.0) * (y - 10.0))]
+        {
+            assert_eq!(found.1, None);
+        }
+        assert!(relief(|x, _| 3.0 * (0.3 * x).sin()).0.l2 < 1.0 + 1e-6, "a roll is an isometry");
+    }
+
+    /// On a cap of the unit sphere of opening angle a the conformal map scales by (1 + cos a)/(1 + cos t) at angle t.
+    #[test]
+    fn the_stretch_of_a_cap_is_that_of_its_stereographic_image() {
+        let sphere = test_surfaces::sphere(5);
+        let faces: Vec<_> =
+            sphere.faces().filter(|f| sphere.triangle_positions(*f).iter().all(|p| p.z > 0.5)).collect();
+        let (cap, _) = sphere.submesh(&faces, |_| false);
+        let (mut grown, mut shrunk) = (0.0, 0.0);
+        for k in 0..1000 {
+            let z = 0.5 + 0.5 * (f64::from(k) + 0.5) / 1000.0;
+            grown += (1.0 + z).powi(2) / 1000.0;
+            shrunk += (1.0 + z).powi(-2) / 1000.0;
+        }
+        let exact = (grown * shrunk).sqrt();
+        let found = of(&cap);
+        assert!((found.l2 - exact).abs() < 0.1 * (exact - 1.0), "{} {exact}", found.l2);
+        let top = found.tip.map(|v| cap.positions()[v.index()].z);
+        assert!(top.is_some_and(|z| z > 0.99), "{top:?}");
+    }
+
+    #[test]
+    fn a_closed_surface_is_held_at_its_sharpest_vertex_and_bulges_across_from_it() {
+        let sphere = test_surfaces::sphere(3);
+        let found = of(&sphere);
+        let [root, tip] = [found.root, found.tip].map(|v| sphere.positions()[v.expect("closed and round").index()]);
+        assert!(root.coords.dot(&tip.coords) < -0.9 && found.l2 > 2.0, "{found:?}");
+    }
+}
