@@ -338,6 +338,12 @@ impl TriMesh {
         (self.position(self.to(h)) - self.position(self.from(h))).norm()
     }
 
+    /// Length of all boundary loops together, summed in the order of half-edges.
+    #[must_use]
+    pub fn boundary_length(&self) -> f64 {
+        self.halfedges().filter(|&h| self.is_boundary(h)).map(|h| self.edge_length(h)).sum()
+    }
+
     /// The same mesh with other guides: for each half-edge whether it lies on one, the same for both sides of an edge.
     ///
     /// # Panics

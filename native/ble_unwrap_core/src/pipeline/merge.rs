@@ -170,7 +170,7 @@ pub(super) fn merge(
     Ok((charts, rungs))
 }
 
-/// The union of two charts flattened anew, whatever they look like now.
+/// The union of two charts flattened anew, whatever they look like now, if that makes no seam longer.
 fn embedded(
     mesh: &TriMesh,
     polygon: &[u32],
@@ -183,7 +183,10 @@ fn embedded(
     faces.sort_unstable();
     let patch = Patch::of_surface(mesh, polygon, faces);
     let chart = charting::as_one(&patch, settings, rungs, progress)?;
-    Ok(chart.map_or(Joined::Refused, |chart| Joined::Chart(Box::new(chart))))
+    // Darts may have made more seam than the border was.
+    let seams = |c: &Chart| c.patch.mesh.boundary_length();
+    let shorter = chart.filter(|chart| seams(chart) <= sides.iter().map(|side| seams(side)).sum());
+    Ok(shorter.map_or(Joined::Refused, |chart| Joined::Chart(Box::new(chart))))
 }
 
 /// Shared border length of each pair of charts that may still be tested, sorted by pair.
@@ -261,6 +264,7 @@ mod tests {
     use super::*;
     use crate::Progress;
     use crate::mesh::test_surfaces;
+    use crate::settings::NEVER_SEWN;
     use nalgebra::{Point2, Point3};
 
     /// Waves of the border, so that two that lie on each other cross, and their height.
@@ -320,7 +324,7 @@ mod tests {
 
     #[test]
     fn a_union_over_the_limit_stays_two_whatever_its_start() {
-        let tight = Settings { stretch_limit: 1.0005, ..Settings::default() };
+        let tight = Settings { stretch_limit: 1.0005, least_sewn: NEVER_SEWN, ..Settings::default() };
         assert_eq!(merged([None, None], Which::All, &tight).0.len(), 2);
     }
 

@@ -180,7 +180,7 @@ fn darts_reach_the_boundary_and_keep_a_chart() {
         mesh.vertices().min_by(|a, b| d(a).total_cmp(&d(b))).expect("a vertex")
     };
     let from = near(0.5, 0.3);
-    let path = shortest_path_to_boundary(&mesh, from, None, length, |_| false).expect("a boundary");
+    let path = shortest_path_to_boundary(&mesh, from, None, length(&mesh), |_| false).expect("a boundary");
     assert!((total(&mesh, &path) - 0.3).abs() < 1e-9);
     assert_eq!(mesh.from(path[0]), from);
     assert!(path.windows(2).all(|w| mesh.to(w[0]) == mesh.from(w[1])));
@@ -189,10 +189,10 @@ fn darts_reach_the_boundary_and_keep_a_chart() {
     assert!(after(&mesh, &cuts).is_disk());
     // Around what is forbidden, or not at all.
     let low = |h: HalfedgeId| mesh.position(mesh.from(h)).y.min(mesh.position(mesh.to(h)).y) < 0.19;
-    let around = shortest_path_to_boundary(&mesh, from, None, length, low).expect("the other sides are free");
+    let around = shortest_path_to_boundary(&mesh, from, None, length(&mesh), low).expect("the other sides are free");
     assert!((total(&mesh, &around) - 0.5).abs() < 1e-9);
-    assert_eq!(shortest_path_to_boundary(&mesh, from, None, length, |_| true), None);
-    assert_eq!(shortest_path_to_boundary(&mesh, near(0.0, 0.4), None, length, |_| true), Some(vec![]));
+    assert_eq!(shortest_path_to_boundary(&mesh, from, None, length(&mesh), |_| true), None);
+    assert_eq!(shortest_path_to_boundary(&mesh, near(0.0, 0.4), None, length(&mesh), |_| true), Some(vec![]));
     let ball = sphere(1);
     let [from, root] = [0, ball.vertex_count() - 1].map(VertexId::new);
     assert_eq!(shortest_path_to_boundary(&ball, from, None, |_| 1.0, |_| false), None);
