@@ -66,12 +66,7 @@ impl Patch {
 
     /// The patch made of some faces of a surface, cut along every edge for which `is_cut` holds (asked once a side).
     #[must_use]
-    pub fn cut_out(
-        mesh: &TriMesh,
-        polygon: &[u32],
-        faces: Vec<FaceId>,
-        is_cut: impl Fn(HalfedgeId) -> bool,
-    ) -> Self {
+    pub fn cut_out(mesh: &TriMesh, polygon: &[u32], faces: Vec<FaceId>, is_cut: impl Fn(HalfedgeId) -> bool) -> Self {
         let (part, vertices) = mesh.submesh(&faces, is_cut);
         let polygon = faces.iter().map(|f| polygon[f.index()]).collect();
         Self { mesh: Arc::new(part), vertices, polygon, faces }

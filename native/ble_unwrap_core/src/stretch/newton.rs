@@ -63,9 +63,8 @@ pub(super) fn minimise(
     progress: &Progress,
 ) -> Result<Minimised, StretchError> {
     let mut uv = start.to_vec();
-    let mut scratch = uv.clone();
     let scale = (surface_area(rest) / plane_area(mesh, &uv)).sqrt();
-    rescale(mesh, &mut uv, scale, &mut scratch, options.keep_apart.is_some());
+    rescale(mesh, &mut uv, scale, options.keep_apart.is_some());
     let energy = StretchEnergy::new(settings.dirichlet_weight);
     let warm = StretchEnergy::new(settings.dirichlet_weight.max(0.5));
     relax_worst(mesh, rest, &mut uv, &warm, options.keep_apart.is_some(), progress)?;
@@ -163,8 +162,8 @@ fn relax_worst(
 }
 
 /// Everything one Newton step works on.
-struct Descent {
-    system: ChartSystem,
+struct Descent<'a> {
+    system: ChartSystem<'a>,
     barrier: Option<Barrier>,
     /// Vertices that stay; none if empty.
     pinned: Vec<bool>,
@@ -173,10 +172,10 @@ struct Descent {
     direction: Vec<f64>,
 }
 
-impl Descent {
+impl<'a> Descent<'a> {
     /// From a map at the scale it is to be minimised at.
     fn new(
-        mesh: &TriMesh,
+        mesh: &'a TriMesh,
         rest: &[RestTriangle],
         uv: Vec<Point2<f64>>,
         pinned: Vec<bool>,
@@ -225,22 +224,14 @@ impl Descent {
 }
 
 /// Scales all of `uv`, unless rounding would flip a triangle or, where that matters, make the boundary
-/// touch itself; `scratch` has the same length.
-pub(super) fn rescale(
-    mesh: &TriMesh,
-    uv: &mut [Point2<f64>],
-    scale: f64,
-    scratch: &mut [Point2<f64>],
-    keep_boundary_simple: bool,
-) {
+/// touch itself.
+pub(super) fn rescale(mesh: &TriMesh, uv: &mut Vec<Point2<f64>>, scale: f64, keep_boundary_simple: bool) {
     if !(scale.is_finite() && scale > 0.0) {
         return;
     }
-    for (s, p) in scratch.iter_mut().zip(uv.iter()) {
-        *s = p * scale;
-    }
-    if first_flip(mesh, scratch).is_none() && (!keep_boundary_simple || boundary_is_simple(mesh, scratch)) {
-        uv.copy_from_slice(scratch);
+    let scaled: Vec<Point2<f64>> = uv.iter().map(|p| p * scale).collect();
+    if first_flip(mesh, &scaled).is_none() && (!keep_boundary_simple || boundary_is_simple(mesh, &scaled)) {
+        *uv = scaled;
     }
 }
 
