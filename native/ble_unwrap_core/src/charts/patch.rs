@@ -37,25 +37,13 @@ impl Patch {
         Self { faces: mesh.faces().collect(), vertices: mesh.vertices().collect(), mesh, polygon }
     }
 
-    /// The components of a whole surface, by lowest face. `polygon` names the polygon of each face. A surface that is
-    /// connected is not copied.
+    /// A component of a surface, of which `faces` are all faces, ascending. A surface that is connected is not copied.
     #[must_use]
-    pub fn components(mesh: &Arc<TriMesh>, polygon: &[u32]) -> Vec<Self> {
-        let (label, count) = mesh.components();
-        if count == 1 {
-            return vec![Self::whole(Arc::clone(mesh), polygon.to_vec())];
+    pub fn component(mesh: &Arc<TriMesh>, polygon: &[u32], faces: &[FaceId]) -> Self {
+        if faces.len() == mesh.face_count() {
+            return Self::whole(Arc::clone(mesh), polygon.to_vec());
         }
-        let groups = Groups::by_label(&label, count, FaceId::new);
-        mesh.partition(&groups)
-            .into_iter()
-            .zip(groups.iter())
-            .map(|((part, vertices), faces)| Self {
-                mesh: Arc::new(part),
-                vertices,
-                polygon: faces.iter().map(|f| polygon[f.index()]).collect(),
-                faces: faces.to_vec(),
-            })
-            .collect()
+        Self::of_surface(mesh, polygon, faces.to_vec())
     }
 
     /// The patch made of some faces of a surface. `faces` should be ascending, for determinism.

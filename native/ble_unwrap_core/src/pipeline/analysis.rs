@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::charts::{Chart, Patch};
 use crate::error::UnwrapError;
-use crate::mesh::{self, ConditionOptions, MeshInput, Surface};
+use crate::mesh::{self, ConditionOptions, FaceId, Groups, MeshInput, Surface};
 use crate::packing::PackSettings;
 use crate::progress::{Cancelled, Progress, Stage};
 use crate::settings::{ChartScale, LimitOver, Settings};
@@ -14,7 +14,7 @@ use crate::settings::{ChartScale, LimitOver, Settings};
 use super::memo::{self, Fingerprint, Kind, Memo, Run};
 use super::rungs::Rungs;
 use super::tally::Tally;
-use super::{Atlas, Clock, budget, component, finish, ribbons};
+use super::{Atlas, Clock, budget, component, finish, on_a_worker, ribbons};
 
 /// A mesh and what was found out about it, for unwrapping it several times with different settings.
 ///
@@ -40,7 +40,7 @@ impl Analysis {
     pub fn new(input: &MeshInput<'_>, weld: bool, progress: &Progress) -> Result<Self, UnwrapError> {
         progress.check()?;
         progress.enter(Stage::Condition);
-        let prepared = Prepared::new(input, weld, progress)?;
+        let prepared = on_a_worker(|| Prepared::new(input, weld, progress))?;
         Ok(Self {
             memo: Memo::new(prepared.surface.mesh.face_count()),
             prepared,
@@ -82,7 +82,7 @@ impl Analysis {
             ..MeshInput::default()
         };
         self.memo.begin();
-        self.prepared.unwrap(&input, settings, Clock::new(), &Run::new(progress, Some(&self.memo)))
+        on_a_worker(|| self.prepared.unwrap(&input, settings, Clock::new(), &Run::new(progress, Some(&self.memo))))
     }
 }
 
@@ -113,18 +113,19 @@ fn charts_of(
     progress.recall(Kind::Charts, input, bytes, || component::charts(patch, settings, tally, progress))
 }
 
-/// The surface of a mesh in connected pieces.
+/// The surface of a mesh, and its connected pieces.
 #[derive(Debug)]
 pub(super) struct Prepared {
     surface: Surface,
-    patches: Vec<Patch>,
+    /// The faces of each piece, ascending. The pieces become meshes of their own only while they are charted.
+    components: Groups<FaceId>,
 }
 
 impl Prepared {
     pub(super) fn new(input: &MeshInput<'_>, weld: bool, progress: &Progress) -> Result<Self, UnwrapError> {
         let surface = mesh::condition(input, &ConditionOptions { weld }, progress)?;
-        let patches = Patch::components(&surface.mesh, &surface.polygon);
-        Ok(Self { surface, patches })
+        let (label, count) = surface.mesh.components();
+        Ok(Self { components: Groups::by_label(&label, count, FaceId::new), surface })
     }
 
     /// The stages after conditioning. Of `input` only positions, corners and offsets are looked at.
@@ -136,10 +137,15 @@ impl Prepared {
         progress: &Run<'_>,
     ) -> Result<Atlas, UnwrapError> {
         progress.enter(Stage::Charts);
-        let (surface, patches) = (&self.surface, &self.patches);
+        let surface = &self.surface;
         let tally = Tally::new(progress, surface.mesh.face_count());
+        let charted = |component: usize| {
+            let faces = self.components.group(component);
+            let patch = Patch::component(&surface.mesh, &surface.polygon, faces);
+            charts_of(&patch, settings, &tally, progress)
+        };
         let made: Vec<Result<Arc<Made>, Cancelled>> =
-            patches.par_iter().with_max_len(1).map(|patch| charts_of(patch, settings, &tally, progress)).collect();
+            (0..self.components.len()).into_par_iter().with_max_len(1).map(charted).collect();
         let (mut charts, mut rungs) = (Vec::new(), Rungs::default());
         for component in made {
             let component = component?;
