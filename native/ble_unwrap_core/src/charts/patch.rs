@@ -37,15 +37,6 @@ impl Patch {
         Self { faces: mesh.faces().collect(), vertices: mesh.vertices().collect(), mesh, polygon }
     }
 
-    /// A component of a surface, of which `faces` are all faces, ascending. A surface that is connected is not copied.
-    #[must_use]
-    pub fn component(mesh: &Arc<TriMesh>, polygon: &[u32], faces: &[FaceId]) -> Self {
-        if faces.len() == mesh.face_count() {
-            return Self::whole(Arc::clone(mesh), polygon.to_vec());
-        }
-        Self::of_surface(mesh, polygon, faces.to_vec())
-    }
-
     /// The patch made of some faces of a surface. `faces` should be ascending, for determinism.
     #[must_use]
     pub fn of_surface(mesh: &TriMesh, polygon: &[u32], faces: Vec<FaceId>) -> Self {

@@ -89,19 +89,19 @@ impl Analysis {
 /// The charts of a component, and how they came about.
 type Made = (Vec<Chart>, Rungs);
 
-/// The charts of a component, or what they were under the same settings but for those of later stages.
+/// The charts of a component, `faces` of the surface, or what they were under the same settings but for those of later stages.
 fn charts_of(
-    patch: &Patch,
+    whole: &Patch,
+    faces: &[FaceId],
     settings: &Settings,
     tally: &Tally<'_>,
     progress: &Run<'_>,
 ) -> Result<Arc<Made>, Cancelled> {
     let input = |f: &mut Fingerprint| {
-        f.mesh(&patch.mesh);
-        f.numbers(&patch.polygon);
+        f.mesh(&whole.mesh);
+        f.numbers(&whole.polygon);
         // They are named in the result.
-        f.indices(patch.faces.iter().map(|face| face.index()));
-        f.indices(patch.vertices.iter().map(|v| v.index()));
+        f.indices(faces.iter().map(|face| face.index()));
         f.settings(&Settings {
             limit_over: LimitOver::Chart,
             chart_scale: ChartScale::Uniform,
@@ -110,7 +110,7 @@ fn charts_of(
         });
     };
     let bytes = |made: &Made| made.0.iter().map(|c| memo::bytes_of(&c.patch.mesh) + 24 * c.uv.len()).sum();
-    progress.recall(Kind::Charts, input, bytes, || component::charts(patch, settings, tally, progress))
+    progress.recall(Kind::Charts, input, bytes, || component::charts(whole, faces, settings, tally, progress))
 }
 
 /// The surface of a mesh, and its connected pieces.
@@ -128,6 +128,16 @@ impl Prepared {
         Ok(Self { components: Groups::by_label(&label, count, FaceId::new), surface })
     }
 
+    /// A component as a mesh of its own, which a connected surface is already.
+    fn whole(&self, faces: &[FaceId]) -> Patch {
+        let Surface { mesh, polygon, .. } = &self.surface;
+        if faces.len() == mesh.face_count() {
+            return Patch::whole(Arc::clone(mesh), polygon.clone());
+        }
+        let (part, _) = mesh.submesh(faces, |_| false);
+        Patch::whole(Arc::new(part), faces.iter().map(|f| polygon[f.index()]).collect())
+    }
+
     /// The stages after conditioning. Of `input` only positions, corners and offsets are looked at.
     pub(super) fn unwrap(
         &self,
@@ -141,8 +151,7 @@ impl Prepared {
         let tally = Tally::new(progress, surface.mesh.face_count());
         let charted = |component: usize| {
             let faces = self.components.group(component);
-            let patch = Patch::component(&surface.mesh, &surface.polygon, faces);
-            charts_of(&patch, settings, &tally, progress)
+            charts_of(&self.whole(faces), faces, settings, &tally, progress)
         };
         let made: Vec<Result<Arc<Made>, Cancelled>> =
             (0..self.components.len()).into_par_iter().with_max_len(1).map(charted).collect();

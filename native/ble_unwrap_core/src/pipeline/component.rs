@@ -51,18 +51,20 @@ const LEAST_FINE_FACES: usize = 1_500;
 /// Share of the work on a component that the coarse mesh takes.
 const COARSE_WORK: f64 = 0.4;
 
-/// The charts of one component of the surface, by lowest face; faces are named as in `patch.faces`.
+/// The charts of one component of the surface, by lowest face. `whole` is the component as a patch of itself; its faces are
+/// named as in `faces`.
 pub(super) fn charts(
-    patch: &Patch,
+    whole: &Patch,
+    faces: &[FaceId],
     settings: &Settings,
     tally: &Tally<'_>,
     progress: &Run<'_>,
 ) -> Result<(Vec<Chart>, Rungs), Cancelled> {
-    let fine = Whole::new(Arc::clone(&patch.mesh), patch.polygon.clone());
-    let size = patch.faces.len() as f64;
+    let fine = Whole { patch: whole };
+    let size = faces.len() as f64;
     let mut rungs = Rungs::default();
-    let mut charts = if patch.mesh.vertex_count() > COARSE_ABOVE && settings.coarse {
-        let coarse = OnCoarse::new(&fine, settings, progress)?;
+    let mut charts = if whole.mesh.vertex_count() > COARSE_ABOVE && settings.coarse {
+        let coarse = OnCoarse::new(fine, settings, progress)?;
         let parts = coarse.parts(&mut rungs, progress)?;
         tally.add(size, COARSE_WORK);
         let done = |faces| tally.add(faces, 1.0 - COARSE_WORK);
@@ -73,21 +75,18 @@ pub(super) fn charts(
         fine.sew(charts, settings, &mut rungs, progress)?.into_iter().map(|sewn| sewn.chart).collect()
     };
     for f in charts.iter_mut().flat_map(|c| &mut c.patch.faces) {
-        *f = patch.faces[f.index()];
+        *f = faces[f.index()];
     }
     Ok((charts, rungs))
 }
 
 /// A connected mesh as a patch of itself.
-struct Whole {
-    patch: Patch,
+#[derive(Clone, Copy)]
+struct Whole<'a> {
+    patch: &'a Patch,
 }
 
-impl Whole {
-    fn new(mesh: Arc<TriMesh>, polygon: Vec<u32>) -> Self {
-        Self { patch: Patch::whole(mesh, polygon) }
-    }
-
+impl Whole<'_> {
     /// The patch made of some faces, cut along some edges of which both sides are given, sorted.
     fn part(&self, faces: &[FaceId], cuts: &[HalfedgeId]) -> Patch {
         if cuts.is_empty() && faces.len() == self.patch.faces.len() {
@@ -175,8 +174,9 @@ enum Outcome {
 
 /// A fine mesh with its coarse one.
 struct OnCoarse<'a> {
-    fine: &'a Whole,
-    whole: Whole,
+    fine: Whole<'a>,
+    /// The coarse mesh as a patch of itself.
+    whole: Patch,
     coarse: Arc<Coarse>,
     settings: &'a Settings,
     /// For the coarse mesh.
@@ -184,7 +184,7 @@ struct OnCoarse<'a> {
 }
 
 impl<'a> OnCoarse<'a> {
-    fn new(fine: &'a Whole, settings: &'a Settings, progress: &Run<'_>) -> Result<Self, Cancelled> {
+    fn new(fine: Whole<'a>, settings: &'a Settings, progress: &Run<'_>) -> Result<Self, Cancelled> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
         let wanted = (COARSE_SHARE * fine.patch.mesh.vertex_count() as f64) as usize;
         let target = wanted.clamp(COARSE_VERTICES.0, COARSE_VERTICES.1);
@@ -196,7 +196,7 @@ impl<'a> OnCoarse<'a> {
         let coarse =
             progress.recall(Kind::Coarse, input, bytes, || mesh::coarsen(&fine.patch.mesh, target, progress))?;
         let polygon = (0..coarse.mesh.face_count()).map(|f| FaceId::new(f).index() as u32).collect();
-        let whole = Whole::new(Arc::new(coarse.mesh.clone()), polygon);
+        let whole = Patch::whole(Arc::new(coarse.mesh.clone()), polygon);
         let mut strict = settings.clone();
         strict.stretch_limit = 1.0 + COARSE_ALLOWANCE * (settings.stretch_limit - 1.0);
         strict.stretch.tolerance *= COARSE_TOLERANCE;
@@ -205,9 +205,10 @@ impl<'a> OnCoarse<'a> {
 
     /// Parts that flatten under the limit on the coarse mesh.
     fn parts(&self, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Vec<Part>, Cancelled> {
-        let charts = self.whole.charts(&self.strict, rungs, &|_| (), progress)?;
-        let parts = self.prolong_labels(&self.fine.patch, &charts, progress)?;
-        let sewn = self.whole.sew(charts, &self.strict, rungs, progress)?;
+        let whole = Whole { patch: &self.whole };
+        let charts = whole.charts(&self.strict, rungs, &|_| (), progress)?;
+        let parts = self.prolong_labels(self.fine.patch, &charts, progress)?;
+        let sewn = whole.sew(charts, &self.strict, rungs, progress)?;
         Ok(self.join(parts, sewn))
     }
 
@@ -351,8 +352,7 @@ impl<'a> OnCoarse<'a> {
             return Ok(Outcome::Fine);
         }
         faces.sort_unstable();
-        let (mesh, polygon) = (&self.whole.patch.mesh, &self.whole.patch.polygon);
-        let patch = Patch::of_surface(mesh, polygon, faces);
+        let patch = Patch::of_surface(&self.whole.mesh, &self.whole.polygon, faces);
         let patches = charting::split(&patch, &self.strict, rungs, progress)?;
         let charting = charting::chart(patches, &self.strict, &|_| (), progress)?;
         rungs.add(&charting.rungs);

@@ -77,11 +77,11 @@ pub(super) fn minimise(
         abandoned_below: f64::NEG_INFINITY,
         converged: false,
     };
-    let mut l2 = descent.system.stretch_sums(&descent.uv).l2();
+    let mut l2 = descent.system.faces.stretch_sums(&descent.uv).l2();
     let tolerance = if descent.barrier.is_some() { APART_TOLERANCE } else { 1.0 } * settings.tolerance;
     for iteration in 0..settings.max_iterations {
         progress.check()?;
-        let warm_up = iteration < WARM_UP && descent.system.value(&energy, &descent.uv) > WARM_UP_ABOVE;
+        let warm_up = iteration < WARM_UP && descent.system.faces.value(&energy, &descent.uv) > WARM_UP_ABOVE;
         let step = descent.step(mesh, if warm_up { &warm } else { &energy });
         let Some((before, after)) = step else {
             // No way down is left that rounding does not swallow.
@@ -90,7 +90,7 @@ pub(super) fn minimise(
         };
         result.iterations = iteration + 1;
         let l2_before = l2;
-        l2 = descent.system.stretch_sums(&descent.uv).l2();
+        l2 = descent.system.faces.stretch_sums(&descent.uv).l2();
         if !warm_up && before - after <= tolerance * after {
             result.converged = true;
             break;
@@ -105,12 +105,14 @@ pub(super) fn minimise(
             }
         }
     }
-    result.uv = descent.uv;
+    // What follows has systems of its own: this one is not held beside them.
+    let Descent { system: ChartSystem { faces, .. }, uv, .. } = descent;
+    result.uv = uv;
     result.l2 = l2;
     if !result.abandoned {
         let mut relaxed = result.uv.clone();
         relax_worst(mesh, rest, &mut relaxed, &warm, options.keep_apart.is_some(), progress)?;
-        let l2 = descent.system.stretch_sums(&relaxed).l2();
+        let l2 = faces.stretch_sums(&relaxed).l2();
         // The average has converged long before a few small triangles have.
         if l2 <= result.l2 {
             result.uv = relaxed;
@@ -187,7 +189,7 @@ impl<'a> Descent<'a> {
     }
 
     fn value(&self, energy: &StretchEnergy, uv: &[Point2<f64>]) -> f64 {
-        let own = self.system.value(energy, uv);
+        let own = self.system.faces.value(energy, uv);
         match &self.barrier {
             Some(barrier) if own.is_finite() => own + barrier.value(uv),
             _ => own,
@@ -202,7 +204,7 @@ impl<'a> Descent<'a> {
             barrier.assemble(&self.uv, &mut self.system);
         }
         let slope = self.system.solve_pinned(&self.pinned, &mut self.direction)?;
-        let mut step = (SAFETY * self.system.first_flip(&self.uv, &self.direction)).min(1.0);
+        let mut step = (SAFETY * self.system.faces.first_flip(&self.uv, &self.direction)).min(1.0);
         if let Some(barrier) = &self.barrier {
             step = step.min(SAFETY * barrier.first_contact(&self.uv, &self.direction, step / SAFETY));
         }

@@ -19,12 +19,17 @@ const RIDGE_ATTEMPTS: usize = 7;
 /// is measured by the mean, to anything that counts.
 const PIN_STIFFNESS: f64 = 1e4;
 
-/// A chart's triangles with everything that does not change between Newton steps: hat gradients,
-/// area weights (summing to one), the place of every block in the sparse matrix, the analysed factor.
-pub(super) struct ChartSystem<'a> {
+/// A chart's triangles with what an energy needs of each: hat gradients, and area weights, which sum to one.
+pub(super) struct ChartFaces<'a> {
     triangles: &'a [[VertexId; 3]],
     hats: Vec<HatGradients>,
     weights: Vec<f64>,
+}
+
+/// A chart's triangles with everything that does not change between Newton steps: the place of every block in the sparse
+/// matrix, the analysed factor.
+pub(super) struct ChartSystem<'a> {
+    pub(super) faces: ChartFaces<'a>,
     /// For each half-edge, where the block of its two ends begins.
     across: Vec<[u32; 3]>,
     /// What was assembled on the diagonal before the ridge.
@@ -50,36 +55,14 @@ impl StretchSums {
     }
 }
 
-impl<'a> ChartSystem<'a> {
-    /// Analyses the Hessian's pattern. O(n log n), a third of a factorisation.
-    pub(super) fn new(mesh: &'a TriMesh, rest: &[RestTriangle]) -> Result<Self, SparseError> {
+impl<'a> ChartFaces<'a> {
+    fn new(mesh: &'a TriMesh, rest: &[RestTriangle]) -> Self {
         let total: f64 = rest.iter().map(RestTriangle::area).sum();
-        let triangles = mesh.triangles();
-        let ends = |h: HalfedgeId| [mesh.from(h), mesh.to(h)].map(|v| v.index() as u32).into();
-        let solver = RoughCholesky::analyse(SparsePattern::from_pairs(mesh.vertex_count(), mesh.edges().map(ends)))?;
-        let pattern = solver.pattern();
-        let place = |v: VertexId, w: VertexId| {
-            let (v, w) = (v.index(), w.index());
-            pattern.position(2 * v.min(w), 2 * v.max(w)).map_or(u32::MAX, |p| p as u32)
-        };
-        let across = triangles.iter().map(|&[a, b, c]| [place(a, b), place(b, c), place(c, a)]).collect();
-        Ok(Self {
+        Self {
+            triangles: mesh.triangles(),
             hats: rest.iter().map(HatGradients::new).collect(),
             weights: rest.iter().map(|r| r.area() / total).collect(),
-            across,
-            base_diagonal: vec![0.0; pattern.size()],
-            hessian: vec![0.0; pattern.entry_count()],
-            gradient: vec![0.0; pattern.size()],
-            triangles,
-            solver,
-        })
-    }
-
-    /// Where the diagonal block of a vertex begins, and how far its second column lies behind its first.
-    #[inline]
-    fn block(&self, vertex: usize) -> (usize, usize) {
-        let pattern = self.solver.pattern();
-        (pattern.diagonal(2 * vertex), pattern.column(2 * vertex).len())
+        }
     }
 
     #[inline]
@@ -115,13 +98,64 @@ impl<'a> ChartSystem<'a> {
         (0..self.triangles.len()).map(|f| self.jacobian(f, uv).determinant()).fold(f64::INFINITY, f64::min)
     }
 
+    /// The greatest step along `direction` at which no triangle has collapsed yet; infinite if none
+    /// ever does. `uv` must have positive triangles.
+    pub(super) fn first_flip(&self, uv: &[Point2<f64>], direction: &[f64]) -> f64 {
+        let mut least = f64::INFINITY;
+        for t in self.triangles {
+            let [p, q, r] = t.map(|v| uv[v.index()]);
+            let along = |v: VertexId| Vector2::new(direction[2 * v.index()], direction[2 * v.index() + 1]);
+            let [dp, dq, dr] = t.map(along);
+            let (e, f, de, df) = (q - p, r - p, dq - dp, dr - dp);
+            let (c, b, a) = (e.perp(&f), e.perp(&df) + de.perp(&f), de.perp(&df));
+            // Smallest positive root of a t² + b t + c, c > 0, in the form that does not cancel.
+            let discriminant = b * b - 4.0 * a * c;
+            if discriminant >= 0.0 {
+                let denominator = discriminant.sqrt() - b;
+                if denominator > 0.0 {
+                    least = least.min(2.0 * c / denominator);
+                }
+            }
+        }
+        least
+    }
+}
+
+impl<'a> ChartSystem<'a> {
+    /// Analyses the Hessian's pattern. O(n log n), a third of a factorisation.
+    pub(super) fn new(mesh: &'a TriMesh, rest: &[RestTriangle]) -> Result<Self, SparseError> {
+        let ends = |h: HalfedgeId| [mesh.from(h), mesh.to(h)].map(|v| v.index() as u32).into();
+        let solver = RoughCholesky::analyse(SparsePattern::from_pairs(mesh.vertex_count(), mesh.edges().map(ends)))?;
+        let pattern = solver.pattern();
+        let place = |v: VertexId, w: VertexId| {
+            let (v, w) = (v.index(), w.index());
+            pattern.position(2 * v.min(w), 2 * v.max(w)).map_or(u32::MAX, |p| p as u32)
+        };
+        let across = mesh.triangles().iter().map(|&[a, b, c]| [place(a, b), place(b, c), place(c, a)]).collect();
+        Ok(Self {
+            faces: ChartFaces::new(mesh, rest),
+            across,
+            base_diagonal: vec![0.0; pattern.size()],
+            hessian: vec![0.0; pattern.entry_count()],
+            gradient: vec![0.0; pattern.size()],
+            solver,
+        })
+    }
+
+    /// Where the diagonal block of a vertex begins, and how far its second column lies behind its first.
+    #[inline]
+    fn block(&self, vertex: usize) -> (usize, usize) {
+        let pattern = self.solver.pattern();
+        (pattern.diagonal(2 * vertex), pattern.column(2 * vertex).len())
+    }
+
     /// Gradient and projected Hessian of the energy at `uv`. O(faces).
     pub(super) fn assemble<E: IsotropicEnergy>(&mut self, energy: &E, uv: &[Point2<f64>]) {
         self.hessian.fill(0.0);
         self.gradient.fill(0.0);
-        for face in 0..self.triangles.len() {
-            let d = face_derivatives(energy, &self.hats[face], &self.jacobian(face, uv));
-            let (t, w) = (self.triangles[face], self.weights[face]);
+        for face in 0..self.faces.triangles.len() {
+            let d = face_derivatives(energy, &self.faces.hats[face], &self.faces.jacobian(face, uv));
+            let (t, w) = (self.faces.triangles[face], self.faces.weights[face]);
             for k in 0..3 {
                 self.add_gradient(t[k].index() as u32, d.gradient[k] * w);
                 self.add_diagonal(t[k].index() as u32, &(d.diagonal[k] * w));
@@ -149,7 +183,8 @@ impl<'a> ChartSystem<'a> {
     /// Adds the block whose rows belong to the start and whose columns belong to the end of a half-edge.
     #[inline]
     fn add_across(&mut self, face: usize, slot: usize, m: &Matrix2<f64>) {
-        let (from, to) = (self.triangles[face][slot], self.triangles[face][(slot + 1) % 3]);
+        let triangle = self.faces.triangles[face];
+        let (from, to) = (triangle[slot], triangle[(slot + 1) % 3]);
         let (at, stride) = (self.across[face][slot] as usize, self.block(from.max(to).index()).1);
         let (m12, m21) = if from < to { (m.m12, m.m21) } else { (m.m21, m.m12) };
         self.hessian[at] += m.m11;
@@ -218,28 +253,6 @@ impl<'a> ChartSystem<'a> {
         }
         slope
     }
-
-    /// The greatest step along `direction` at which no triangle has collapsed yet; infinite if none
-    /// ever does. `uv` must have positive triangles.
-    pub(super) fn first_flip(&self, uv: &[Point2<f64>], direction: &[f64]) -> f64 {
-        let mut least = f64::INFINITY;
-        for t in self.triangles {
-            let [p, q, r] = t.map(|v| uv[v.index()]);
-            let along = |v: VertexId| Vector2::new(direction[2 * v.index()], direction[2 * v.index() + 1]);
-            let [dp, dq, dr] = t.map(along);
-            let (e, f, de, df) = (q - p, r - p, dq - dp, dr - dp);
-            let (c, b, a) = (e.perp(&f), e.perp(&df) + de.perp(&f), de.perp(&df));
-            // Smallest positive root of a t² + b t + c, c > 0, in the form that does not cancel.
-            let discriminant = b * b - 4.0 * a * c;
-            if discriminant >= 0.0 {
-                let denominator = discriminant.sqrt() - b;
-                if denominator > 0.0 {
-                    least = least.min(2.0 * c / denominator);
-                }
-            }
-        }
-        least
-    }
 }
 
 /// `uv + step · direction` into `out`.
@@ -275,7 +288,8 @@ mod tests {
         system.assemble(&energy, &bent);
         let gradient = system.gradient().to_vec();
         for k in 0..gradient.len() {
-            let df = system.value(&energy, &nudge(&bent, k, h)) - system.value(&energy, &nudge(&bent, k, -h));
+            let df =
+                system.faces.value(&energy, &nudge(&bent, k, h)) - system.faces.value(&energy, &nudge(&bent, k, -h));
             assert!((df / (2.0 * h) - gradient[k]).abs() < 1e-7, "{k}");
         }
         for k in 0..gradient.len() {
@@ -296,18 +310,18 @@ mod tests {
     fn the_first_flip_is_where_a_determinant_vanishes() {
         let mesh = hemisphere(6);
         let rest = RestTriangle::of_mesh(&mesh);
-        let system = ChartSystem::new(&mesh, &rest).expect("analysis");
+        let faces = ChartFaces::new(&mesh, &rest);
         let circle = crate::stretch::TutteBoundary::Circle;
         let uv = crate::stretch::tutte_embedding(&mesh, &rest, circle, &crate::progress::Progress::new());
         let uv = uv.expect("solver").expect("positive");
         for seed in 0..20_u32 {
             let direction: Vec<f64> =
                 (0..2 * uv.len() as u32).map(|k| f64::from((k * 7919 + seed * 104_729) % 1009) / 504.0 - 1.0).collect();
-            let limit = system.first_flip(&uv, &direction);
+            let limit = faces.first_flip(&uv, &direction);
             let least = |t: f64| {
                 let mut moved = uv.clone();
                 advance(&uv, &direction, t, &mut moved);
-                system.least_determinant(&moved)
+                faces.least_determinant(&moved)
             };
             assert!(limit.is_finite() && least(0.999 * limit) > 0.0 && least(1.001 * limit) < 0.0, "{limit}");
         }
