@@ -1,5 +1,6 @@
 //! A mesh made ready to be unwrapped again and again.
 
+use std::cmp::Reverse;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -89,7 +90,8 @@ impl Analysis {
 /// The charts of a component, and how they came about.
 type Made = (Vec<Chart>, Rungs);
 
-/// The charts of a component, `faces` of the surface, or what they were under the same settings but for those of later stages.
+/// The charts of a component, which is `faces` of the surface, or what they were under the same settings but for those of
+/// later stages.
 fn charts_of(
     whole: &Patch,
     faces: &[FaceId],
@@ -151,12 +153,16 @@ impl Prepared {
         let tally = Tally::new(progress, surface.mesh.face_count());
         let charted = |component: usize| {
             let faces = self.components.group(component);
-            charts_of(&self.whole(faces), faces, settings, &tally, progress)
+            (component, charts_of(&self.whole(faces), faces, settings, &tally, progress))
         };
-        let made: Vec<Result<Arc<Made>, Cancelled>> =
-            (0..self.components.len()).into_par_iter().with_max_len(1).map(charted).collect();
+        // The largest first, so that no long one starts last.
+        let mut order: Vec<usize> = (0..self.components.len()).collect();
+        order.sort_by_key(|&component| Reverse(self.components.group(component).len()));
+        let mut made: Vec<(usize, Result<Arc<Made>, Cancelled>)> =
+            order.into_par_iter().with_max_len(1).map(charted).collect();
+        made.sort_unstable_by_key(|m| m.0);
         let (mut charts, mut rungs) = (Vec::new(), Rungs::default());
-        for component in made {
+        for (_, component) in made {
             let component = component?;
             rungs.add(&component.1);
             match Arc::try_unwrap(component) {
