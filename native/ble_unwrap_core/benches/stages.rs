@@ -110,7 +110,7 @@ impl Polygons {
     /// The surface as the one piece it is.
     fn patch(&self) -> Patch {
         let surface = self.surface();
-        Patch::components(&surface.mesh, &surface.polygon).swap_remove(0)
+        Patch::whole(surface.mesh, surface.polygon)
     }
 }
 

@@ -61,8 +61,8 @@ mod sampled {
         let (name, mesh) = match mesh {
             Some(path) => {
                 let name = Path::new(path).file_name().unwrap_or_default().to_string_lossy().into_owned();
-                let text = fs::read_to_string(path).map_err(|error| format!("{path}: {error}"))?;
-                (name, polygons(obj::read(&text).map_err(|error| format!("{path}: {error}"))?)?)
+                let mesh = obj::Polygons::read(path.as_ref()).map_err(|error| format!("{path}: {error}"))?;
+                (name, polygons(mesh)?)
             }
             None => ("generated sculpt".to_string(), sculpt_like(QUADS)),
         };
@@ -94,11 +94,14 @@ mod sampled {
     }
 
     /// The polygons of a file, which are checked by the library.
-    fn polygons((positions, faces): obj::Polygons) -> Result<PolyMesh, Box<dyn Error>> {
-        let faces = faces.into_iter().map(|face| face.into_iter().map(u32::try_from).collect());
-        let faces =
-            faces.collect::<Result<Vec<Vec<u32>>, _>>().map_err(|_| "a face names a vertex before the first")?;
-        Ok(PolyMesh { positions, faces })
+    fn polygons(mesh: obj::Polygons) -> Result<PolyMesh, Box<dyn Error>> {
+        let corner = |vertex: &i32| u32::try_from(*vertex).map_err(|_| "a face names a vertex before the first");
+        let corners = mesh.corner_vertices.iter().map(corner).collect::<Result<Vec<u32>, _>>()?;
+        let mut faces = Vec::with_capacity(mesh.face_offsets.len());
+        for face in mesh.face_offsets.windows(2) {
+            faces.push(corners[usize::try_from(face[0])?..usize::try_from(face[1])?].to_vec());
+        }
+        Ok(PolyMesh { positions: mesh.positions, faces })
     }
 
     /// Samples of unwraps of a mesh, their number, their seconds, and the last one's result.
@@ -235,9 +238,12 @@ mod sampled {
 
         #[test]
         fn faces_before_the_first_vertex_are_refused() {
-            let positions = vec![[0.0; 3]; 3];
-            assert!(polygons((positions.clone(), vec![vec![0, 1, -1]])).is_err());
-            assert_eq!(polygons((positions, vec![vec![0, 1, 2]])).expect("a triangle").faces, [[0, 1, 2]]);
+            let triangle = |corner_vertices| {
+                let (positions, face_offsets) = (vec![[0.0; 3]; 3], vec![0, 3]);
+                polygons(obj::Polygons { positions, corner_vertices, face_offsets })
+            };
+            assert!(triangle(vec![0, 1, -1]).is_err());
+            assert_eq!(triangle(vec![0, 1, 2]).expect("a triangle").faces, [[0, 1, 2]]);
         }
     }
 }

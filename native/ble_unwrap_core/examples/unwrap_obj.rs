@@ -3,9 +3,10 @@
 //! Shows how the core is called from Rust; the Blender scripts do the same job for many formats.
 #![expect(clippy::print_stdout, reason = "a command line program")]
 
+use std::env;
 use std::error::Error;
-use std::fmt::Write as _;
-use std::{env, fs};
+use std::fs::File;
+use std::io::{BufWriter, Write};
 
 use ble_unwrap_core::{MeshInput, Progress, Settings, unwrap};
 
@@ -20,35 +21,29 @@ fn main() -> Result<(), Box<dyn Error>> {
     if let Some(limit) = rest.first() {
         settings.stretch_limit = limit.parse()?;
     }
-    let (positions, faces) = obj::read(&fs::read_to_string(input)?)?;
-    let corners: Vec<i32> = faces.iter().flatten().copied().collect();
-    let mut offsets = vec![0];
-    for face in &faces {
-        offsets.push(offsets[offsets.len() - 1] + i32::try_from(face.len())?);
-    }
-    let mesh = MeshInput {
-        positions: &positions,
-        corner_vertices: &corners,
-        face_offsets: &offsets,
-        corner_triangles: None,
+    let mesh = obj::Polygons::read(input.as_ref())?;
+    let input = MeshInput {
+        positions: &mesh.positions,
+        corner_vertices: &mesh.corner_vertices,
+        face_offsets: &mesh.face_offsets,
         ..MeshInput::default()
     };
-    let atlas = unwrap(&mesh, &settings, &Progress::new())?;
+    let atlas = unwrap(&input, &settings, &Progress::new())?;
     println!("{:#?}", atlas.report);
-    let mut text = String::new();
-    for p in &positions {
-        writeln!(text, "v {} {} {}", p[0], p[1], p[2])?;
+    let mut file = BufWriter::new(File::create(output)?);
+    for p in &mesh.positions {
+        writeln!(file, "v {} {} {}", p[0], p[1], p[2])?;
     }
     for uv in &atlas.uv {
-        writeln!(text, "vt {} {}", uv[0], uv[1])?;
+        writeln!(file, "vt {} {}", uv[0], uv[1])?;
     }
-    for (face, corner) in faces.iter().zip(&offsets) {
-        text.push('f');
-        for (k, v) in (1..).zip(face) {
-            write!(text, " {}/{}", v + 1, corner + k)?;
+    for face in mesh.face_offsets.windows(2) {
+        write!(file, "f")?;
+        for corner in face[0]..face[1] {
+            write!(file, " {}/{}", mesh.corner_vertices[usize::try_from(corner)?] + 1, corner + 1)?;
         }
-        text.push('\n');
+        writeln!(file)?;
     }
-    fs::write(output, text)?;
+    file.flush()?;
     Ok(())
 }

@@ -1,5 +1,7 @@
 //! Patches and charts, with their maps to the surface.
 
+use std::sync::Arc;
+
 use nalgebra::Point2;
 
 use crate::mesh::{FaceId, Groups, HalfedgeId, TriMesh, VertexId, measure};
@@ -7,8 +9,8 @@ use crate::mesh::{FaceId, Groups, HalfedgeId, TriMesh, VertexId, measure};
 /// A connected piece of a surface, made of whole polygons.
 #[derive(Clone, Debug)]
 pub struct Patch {
-    /// The piece as a mesh of its own.
-    pub mesh: TriMesh,
+    /// The piece as a mesh of its own; shared, as a piece may be the whole surface and stay as it is for several stages.
+    pub mesh: Arc<TriMesh>,
     /// The surface's face that each face of the patch is.
     pub faces: Vec<FaceId>,
     /// The surface's vertex that each vertex of the patch lies at.
@@ -29,28 +31,24 @@ pub struct Chart {
 }
 
 impl Patch {
-    /// The components of a whole surface, by lowest face. `polygon` names the polygon of each face.
+    /// A connected mesh as a patch of itself. `polygon` names the polygon of each face.
     #[must_use]
-    pub fn components(mesh: &TriMesh, polygon: &[u32]) -> Vec<Self> {
-        let (label, count) = mesh.components();
-        let groups = Groups::by_label(&label, count, FaceId::new);
-        mesh.partition(&groups)
-            .into_iter()
-            .zip(groups.iter())
-            .map(|((part, vertices), faces)| Self {
-                mesh: part,
-                vertices,
-                polygon: faces.iter().map(|f| polygon[f.index()]).collect(),
-                faces: faces.to_vec(),
-            })
-            .collect()
+    pub fn whole(mesh: Arc<TriMesh>, polygon: Vec<u32>) -> Self {
+        Self { faces: mesh.faces().collect(), vertices: mesh.vertices().collect(), mesh, polygon }
     }
 
     /// The patch made of some faces of a surface. `faces` should be ascending, for determinism.
     #[must_use]
     pub fn of_surface(mesh: &TriMesh, polygon: &[u32], faces: Vec<FaceId>) -> Self {
-        let (part, vertices) = mesh.submesh(&faces, |_| false);
-        Self { mesh: part, vertices, polygon: faces.iter().map(|f| polygon[f.index()]).collect(), faces }
+        Self::cut_out(mesh, polygon, faces, |_| false)
+    }
+
+    /// The patch made of some faces of a surface, cut along every edge for which `is_cut` holds (asked once a side).
+    #[must_use]
+    pub fn cut_out(mesh: &TriMesh, polygon: &[u32], faces: Vec<FaceId>, is_cut: impl Fn(HalfedgeId) -> bool) -> Self {
+        let (part, vertices) = mesh.submesh(&faces, is_cut);
+        let polygon = faces.iter().map(|f| polygon[f.index()]).collect();
+        Self { mesh: Arc::new(part), vertices, polygon, faces }
     }
 
     /// The parts of this patch by label, each of which must be connected.
@@ -62,7 +60,7 @@ impl Patch {
             .into_iter()
             .zip(groups.iter())
             .map(|((mesh, vertices), local)| Self {
-                mesh,
+                mesh: Arc::new(mesh),
                 vertices: vertices.iter().map(|v| self.vertices[v.index()]).collect(),
                 faces: local.iter().map(|f| self.faces[f.index()]).collect(),
                 polygon: local.iter().map(|f| self.polygon[f.index()]).collect(),
@@ -80,7 +78,7 @@ impl Patch {
         let all: Vec<FaceId> = self.mesh.faces().collect();
         let (mesh, vertices) = self.mesh.submesh(&all, |h| is_cut[h.index()]);
         Self {
-            mesh,
+            mesh: Arc::new(mesh),
             vertices: vertices.iter().map(|v| self.vertices[v.index()]).collect(),
             faces: self.faces.clone(),
             polygon: self.polygon.clone(),

@@ -1,6 +1,6 @@
 //! Sparse symmetric positive definite systems: analyse a pattern once, factor it many times.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
 use faer::perm::PermRef;
 use faer::sparse::linalg::SupernodalThreshold;
@@ -42,13 +42,14 @@ const RESIDUAL: f64 = 1e-4;
 const MOST_STEPS: usize = 24;
 
 /// LLᵀ of a sparse symmetric positive definite matrix: owns the symbolic analysis (approximate
-/// minimum degree), the factor and the scratch memory.
+/// minimum degree), the factor and the scratch memory, of which factoring and solving share one piece.
 ///
 /// Serial, hence the same bits whatever the number of threads; callers run charts in parallel. Once
 /// made, refactoring and solving allocate nothing.
 pub struct SparseCholesky {
     pattern: SparsePattern,
     factor: Factor<f64>,
+    scratch: MemBuffer,
 }
 
 impl SparseCholesky {
@@ -58,8 +59,9 @@ impl SparseCholesky {
     /// # Errors
     /// [`SparseError::TooLarge`].
     pub fn analyse(pattern: SparsePattern) -> Result<Self, SparseError> {
-        let factor = Factor::analyse(&pattern, &Order::of(&pattern)?)?;
-        Ok(Self { pattern, factor })
+        let factor = Factor::analyse(&pattern, Order::of(&pattern)?)?;
+        let scratch = buffer(factor.refactor_scratch().or(factor.solve_scratch()))?;
+        Ok(Self { pattern, factor, scratch })
     }
 
     /// The pattern that was analysed.
@@ -80,7 +82,7 @@ impl SparseCholesky {
         if let Some(bad) = values.iter().position(|v| !v.is_finite()) {
             return Err(SparseError::NotPositiveDefinite { row: self.pattern.row(bad) });
         }
-        self.factor.refactor(&self.pattern, values)
+        self.factor.refactor(&self.pattern, values, MemStack::new(&mut self.scratch))
     }
 
     /// Solves with the last matrix factored: one or two right-hand sides, one after the other in
@@ -89,7 +91,7 @@ impl SparseCholesky {
     /// # Panics
     /// If the length of `columns` is not once or twice the size of the matrix.
     pub fn solve_in_place(&mut self, columns: &mut [f64]) {
-        self.factor.solve_in_place(columns);
+        self.factor.solve_in_place(columns, MemStack::new(&mut self.scratch));
     }
 }
 
@@ -98,12 +100,9 @@ impl SparseCholesky {
 pub struct RoughCholesky {
     pattern: SparsePattern,
     factor: Factor<f32>,
-    /// The matrix in single precision.
-    rough: Vec<f32>,
-    column: Vec<f32>,
-    residual: Vec<f64>,
-    search: Vec<f64>,
-    image: Vec<f64>,
+    /// For factoring: the matrix in single precision, and what the factorisation needs. For solving: the vectors of the
+    /// conjugate gradients, and what a solution by the factor needs. Never both at once.
+    scratch: MemBuffer,
 }
 
 impl RoughCholesky {
@@ -111,19 +110,15 @@ impl RoughCholesky {
     ///
     /// # Errors
     /// [`SparseError::TooLarge`].
-    pub fn analyse(blocks: &SparsePattern) -> Result<Self, SparseError> {
-        let pattern = blocks.with_blocks_of_two();
-        let factor = Factor::analyse(&pattern, &Order::of(blocks)?.with_blocks_of_two())?;
+    pub fn analyse(blocks: SparsePattern) -> Result<Self, SparseError> {
+        let (pattern, order) = (blocks.with_blocks_of_two(), Order::of(&blocks)?.with_blocks_of_two());
+        drop(blocks);
+        let factor = Factor::analyse(&pattern, order)?;
         let n = pattern.size();
-        Ok(Self {
-            factor,
-            rough: vec![0.0; pattern.entry_count()],
-            column: vec![0.0; n],
-            residual: vec![0.0; n],
-            search: vec![0.0; n],
-            image: vec![0.0; n],
-            pattern,
-        })
+        let to_factor = StackReq::new::<f32>(pattern.entry_count()).and(factor.refactor_scratch());
+        let vectors = StackReq::new::<f64>(n).array(3).and(StackReq::new::<f32>(n));
+        let scratch = buffer(to_factor.or(vectors.and(factor.solve_scratch())))?;
+        Ok(Self { pattern, factor, scratch })
     }
 
     /// The pattern of all unknowns, two for each block.
@@ -141,17 +136,16 @@ impl RoughCholesky {
     /// If there is not one value for each entry of the pattern.
     pub fn refactor(&mut self, values: &[f64]) -> Result<(), SparseError> {
         assert_eq!(values.len(), self.pattern.entry_count(), "one value for each entry of the pattern");
-        for (rough, value) in self.rough.iter_mut().zip(values) {
-            *rough = *value as f32;
-        }
+        let stack = MemStack::new(&mut self.scratch);
+        let (mut rough, stack) = stack.make_with(values.len(), |at| values[at] as f32);
         for j in 0..self.pattern.size() {
             let at = self.pattern.diagonal(j);
-            self.rough[at] = (values[at] * (1.0 + ROUGH_RIDGE)) as f32;
+            rough[at] = (values[at] * (1.0 + ROUGH_RIDGE)) as f32;
         }
-        if let Some(bad) = self.rough.iter().position(|v| !v.is_finite()) {
+        if let Some(bad) = rough.iter().position(|v| !v.is_finite()) {
             return Err(SparseError::NotPositiveDefinite { row: self.pattern.row(bad) });
         }
-        self.factor.refactor(&self.pattern, &self.rough)
+        self.factor.refactor(&self.pattern, &rough, stack)
     }
 
     /// Solves a system whose matrix, with these values, is near the last one factored: `x` is the right-hand side, and
@@ -161,44 +155,52 @@ impl RoughCholesky {
     /// If there is not one value for each entry of the pattern, or the length of `x` is not its size.
     pub fn solve_in_place(&mut self, values: &[f64], x: &mut [f64]) {
         assert_eq!((values.len(), x.len()), (self.pattern.entry_count(), self.pattern.size()), "of the pattern");
-        self.residual.copy_from_slice(x);
+        let n = x.len();
+        let stack = MemStack::new(&mut self.scratch);
+        let (mut residual, stack) = stack.make_with(n, |i| x[i]);
+        let (mut search, stack) = stack.make_with(n, |_| 0.0);
+        let (mut image, stack) = stack.make_with(n, |_| 0.0);
+        let (mut column, stack) = stack.make_with(n, |_| 0.0);
         x.fill(0.0);
-        let target = RESIDUAL * RESIDUAL * dot(&self.residual, &self.residual);
-        self.search.fill(0.0);
+        let target = RESIDUAL * RESIDUAL * dot(&residual, &residual);
         let mut before = f64::INFINITY;
         for _ in 0..MOST_STEPS {
             // The preconditioned residual, in `image` until the search direction has it.
-            for (c, r) in self.column.iter_mut().zip(&self.residual) {
+            for (c, r) in column.iter_mut().zip(residual.iter()) {
                 *c = *r as f32;
             }
-            self.factor.solve_in_place(&mut self.column);
-            for (i, c) in self.image.iter_mut().zip(&self.column) {
+            self.factor.solve_in_place(&mut column, stack);
+            for (i, c) in image.iter_mut().zip(column.iter()) {
                 *i = f64::from(*c);
             }
-            let now = dot(&self.image, &self.residual);
+            let now = dot(&image, &residual);
             if !(now > 0.0 && now.is_finite()) {
                 break;
             }
             let share = now / before;
-            for (s, i) in self.search.iter_mut().zip(&self.image) {
+            for (s, i) in search.iter_mut().zip(image.iter()) {
                 *s = i + share * *s;
             }
             before = now;
-            self.pattern.multiply(values, &self.search, &mut self.image);
-            let curvature = dot(&self.image, &self.search);
+            self.pattern.multiply(values, &search, &mut image);
+            let curvature = dot(&image, &search);
             if !(curvature > 0.0 && curvature.is_finite()) {
                 break;
             }
             let length = now / curvature;
-            for ((x, r), (s, i)) in x.iter_mut().zip(&mut self.residual).zip(self.search.iter().zip(&self.image)) {
+            for ((x, r), (s, i)) in x.iter_mut().zip(residual.iter_mut()).zip(search.iter().zip(image.iter())) {
                 *x += length * s;
                 *r -= length * i;
             }
-            if dot(&self.residual, &self.residual) <= target {
+            if dot(&residual, &residual) <= target {
                 break;
             }
         }
     }
+}
+
+fn buffer(size: StackReq) -> Result<MemBuffer, SparseError> {
+    MemBuffer::try_new(size).map_err(|_| SparseError::TooLarge)
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -216,8 +218,7 @@ impl Order {
     fn of(pattern: &SparsePattern) -> Result<Self, SparseError> {
         let n = pattern.size();
         let (mut forward, mut inverse) = (vec![0; n], vec![0; n]);
-        let scratch = amd::order_maybe_unsorted_scratch::<u32>(n, pattern.entry_count());
-        let mut scratch = MemBuffer::try_new(scratch).map_err(|_| SparseError::TooLarge)?;
+        let mut scratch = buffer(amd::order_maybe_unsorted_scratch::<u32>(n, pattern.entry_count()))?;
         let stack = MemStack::new(&mut scratch);
         amd::order_maybe_unsorted(&mut forward, &mut inverse, pattern.symbolic(), amd::Control::default(), stack)
             .map_err(|_: FaerError| SparseError::TooLarge)?;
@@ -231,42 +232,49 @@ impl Order {
     }
 }
 
-/// A factor in some precision, its symbolic analysis and the scratch memory.
+/// A factor in some precision, and its symbolic analysis.
 struct Factor<T> {
     symbolic: SymbolicCholesky<u32>,
     values: Vec<T>,
-    factor_scratch: MemBuffer,
-    solve_scratch: MemBuffer,
 }
 
 impl<T: RealField + Copy + Default> Factor<T> {
-    fn analyse(pattern: &SparsePattern, order: &Order) -> Result<Self, SparseError> {
+    fn analyse(pattern: &SparsePattern, order: Order) -> Result<Self, SparseError> {
         // The 2×2 blocks of a map's Hessian make dense panels even in small charts.
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..CholeskySymbolicParams::default()
         };
-        let order = PermRef::new_checked(&order.forward, &order.inverse, pattern.size());
-        let ordering = SymmetricOrdering::Custom(order);
+        let permutation = PermRef::new_checked(&order.forward, &order.inverse, pattern.size());
+        let ordering = SymmetricOrdering::Custom(permutation);
         let symbolic = factorize_symbolic_cholesky(pattern.symbolic(), Side::Upper, ordering, params)
             .map_err(|_: FaerError| SparseError::TooLarge)?;
-        let buffer = |req| MemBuffer::try_new(req).map_err(|_| SparseError::TooLarge);
-        let factor_scratch = buffer(symbolic.factorize_numeric_llt_scratch::<T>(Par::Seq, Spec::default()))?;
-        let solve_scratch = buffer(symbolic.solve_in_place_scratch::<T>(MAX_COLUMNS, Par::Seq))?;
+        // The analysis has a copy.
+        drop(order);
         let mut values = Vec::new();
         values.try_reserve_exact(symbolic.len_val()).map_err(|_| SparseError::TooLarge)?;
         values.resize(symbolic.len_val(), T::default());
-        Ok(Self { symbolic, values, factor_scratch, solve_scratch })
+        Ok(Self { symbolic, values })
     }
 
-    fn refactor(&mut self, pattern: &SparsePattern, values: &[T]) -> Result<(), SparseError> {
+    /// What [`Factor::refactor`] needs of a stack.
+    fn refactor_scratch(&self) -> StackReq {
+        self.symbolic.factorize_numeric_llt_scratch::<T>(Par::Seq, Spec::default())
+    }
+
+    /// What [`Factor::solve_in_place`] needs of a stack.
+    fn solve_scratch(&self) -> StackReq {
+        self.symbolic.solve_in_place_scratch::<T>(MAX_COLUMNS, Par::Seq)
+    }
+
+    fn refactor(&mut self, pattern: &SparsePattern, values: &[T], stack: &mut MemStack) -> Result<(), SparseError> {
         let done = self.symbolic.factorize_numeric_llt(
             &mut self.values,
             SparseColMatRef::new(pattern.symbolic(), values),
             Side::Upper,
             LltRegularization::default(),
             Par::Seq,
-            MemStack::new(&mut self.factor_scratch),
+            stack,
             Spec::default(),
         );
         restore_vector_state();
@@ -279,7 +287,7 @@ impl<T: RealField + Copy + Default> Factor<T> {
         }
     }
 
-    fn solve_in_place(&mut self, columns: &mut [T]) {
+    fn solve_in_place(&self, columns: &mut [T], stack: &mut MemStack) {
         let n = self.symbolic.nrows();
         if n == 0 {
             return;
@@ -287,7 +295,6 @@ impl<T: RealField + Copy + Default> Factor<T> {
         let count = columns.len() / n;
         assert!(columns.len() == count * n && (1..=MAX_COLUMNS).contains(&count), "one or two columns of length {n}");
         let rhs = MatMut::from_column_major_slice_mut(columns, n, count);
-        let stack = MemStack::new(&mut self.solve_scratch);
         LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack);
         restore_vector_state();
     }
@@ -396,7 +403,7 @@ mod tests {
     fn a_rough_factor_solves_to_a_small_residual() {
         for (w, shift) in [(3, 0.1), (40, 0.1), (40, 1e-7)] {
             let (scalar, values) = blocks(w, shift);
-            let mut solver = RoughCholesky::analyse(&scalar).expect("analysis");
+            let mut solver = RoughCholesky::analyse(scalar.clone()).expect("analysis");
             solver.refactor(&values).expect("positive definite");
             let b: Vec<f64> = (0..2 * w * w).map(|i| ((i * 37) % 11) as f64 - 5.0).collect();
             let mut x = b.clone();
@@ -411,7 +418,7 @@ mod tests {
     #[test]
     fn a_matrix_that_changed_since_is_solved_all_the_same() {
         let (scalar, values) = blocks(30, 0.5);
-        let mut solver = RoughCholesky::analyse(&scalar).expect("analysis");
+        let mut solver = RoughCholesky::analyse(scalar.clone()).expect("analysis");
         solver.refactor(&values).expect("positive definite");
         let changed: Vec<f64> = values.iter().enumerate().map(|(i, v)| v * (1.0 + 1e-3 * (i % 7) as f64)).collect();
         let b: Vec<f64> = (0..2 * 900).map(|i| ((i * 53) % 13) as f64 - 6.0).collect();

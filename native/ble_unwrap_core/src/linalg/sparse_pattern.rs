@@ -29,7 +29,9 @@ impl SparsePattern {
         for j in 0..size {
             column_start[j + 1] += column_start[j];
         }
-        Self::new(column_start, entries.into_iter().map(|(_, row)| row).collect())
+        // Not in place of the pairs, which have room for more.
+        let row = entries.iter().map(|e| e.1).collect();
+        Self::new(column_start, row)
     }
 
     fn new(column_start: Vec<u32>, row: Vec<u32>) -> Self {

@@ -1,5 +1,7 @@
 //! Any polygons in, an oriented manifold out.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 use rayon::slice::ParallelSliceMut;
 
@@ -40,7 +42,7 @@ impl Default for ConditionOptions {
 #[derive(Clone, Debug)]
 pub struct Surface {
     /// The mesh, centred on the middle of its box and scaled to unit area (see [`Surface::scale`]).
-    pub mesh: TriMesh,
+    pub mesh: Arc<TriMesh>,
     /// The input polygon of each triangle; ascending.
     pub polygon: Vec<u32>,
     /// The input corner of each corner of the mesh.
@@ -64,7 +66,7 @@ impl Default for Surface {
     /// No faces.
     fn default() -> Self {
         Self {
-            mesh: TriMesh::default(),
+            mesh: Arc::default(),
             polygon: Vec::new(),
             corner: Vec::new(),
             vertex: Vec::new(),
@@ -162,7 +164,7 @@ pub fn condition(input: &MeshInput<'_>, options: &ConditionOptions, progress: &P
     progress.check()?;
 
     Ok(Surface {
-        mesh,
+        mesh: Arc::new(mesh),
         polygon: triangulation.polygon,
         corner: assembled.corner,
         vertex,

@@ -34,14 +34,14 @@ impl<T: Copy> Groups<T> {
             offsets[g + 1] += offsets[g];
         }
         let mut next = offsets.clone();
-        let mut order = vec![0usize; offsets[count]];
+        let mut order = vec![0u32; offsets[count]];
         for (i, &label) in labels.iter().enumerate() {
             if (label as usize) < count {
-                order[next[label as usize]] = i;
+                order[next[label as usize]] = i as u32;
                 next[label as usize] += 1;
             }
         }
-        Self { offsets, items: order.into_iter().map(item).collect() }
+        Self { offsets, items: order.into_iter().map(|i| item(i as usize)).collect() }
     }
 
     /// Appends an item to the last, still open group.

@@ -31,6 +31,9 @@ pub struct TriMesh {
 /// much longer to follow the guide.
 const GUIDE_COST: f64 = 0.1;
 
+/// A part of at least one in so many faces is extracted by a table of all faces, a smaller one by looking its faces up.
+const LARGE_PART: usize = 16;
+
 /// Counts of the cells of a mesh, and what follows from them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Topology {
@@ -158,18 +161,20 @@ impl TriMesh {
 
     /// The part of the mesh made of `faces` (in this order), cut along every edge for which
     /// `is_cut` holds (asked once a side). Returns it with the source of each vertex; face `i` of
-    /// the part is `faces[i]`. O(m log m) in the number m of faces of the part.
+    /// the part is `faces[i]`. O(m log m) in the number m of faces of the part, O(n) at most.
     #[must_use]
     pub fn submesh(&self, faces: &[FaceId], is_cut: impl Fn(HalfedgeId) -> bool) -> (Self, Vec<VertexId>) {
-        let mut local: Vec<(FaceId, usize)> = faces.iter().enumerate().map(|(i, &f)| (f, i)).collect();
-        local.sort_unstable();
-        let whole = faces.len() == self.face_count() && faces.iter().enumerate().all(|(i, f)| f.index() == i);
-        let find = |f: FaceId| {
-            if whole {
-                return Some(f.index());
+        if faces.len() >= self.face_count() / LARGE_PART {
+            let mut place = vec![FaceId::NONE; self.face_count()];
+            for (i, f) in faces.iter().enumerate() {
+                place[f.index()] = FaceId::new(i);
             }
-            local.binary_search_by_key(&f, |e| e.0).ok().map(|at| local[at].1)
-        };
+            let find = |f: FaceId| (!place[f.index()].is_none()).then(|| place[f.index()].index());
+            return self.glue_part(faces, |h, t| if is_cut(h) || is_cut(t) { None } else { find(t.face()) });
+        }
+        let mut place: Vec<(FaceId, FaceId)> = faces.iter().enumerate().map(|(i, &f)| (f, FaceId::new(i))).collect();
+        place.sort_unstable();
+        let find = |f: FaceId| place.binary_search_by_key(&f, |e| e.0).ok().map(|at| place[at].1.index());
         self.glue_part(faces, |h, t| if is_cut(h) || is_cut(t) { None } else { find(t.face()) })
     }
 

@@ -78,7 +78,7 @@ const SERIAL: usize = 8192;
 
 impl BoxTree {
     /// O(n log n). The order depends on the boxes alone; ties go by index.
-    pub(crate) fn new(boxes: &[Bounds]) -> Self {
+    pub(crate) fn new(boxes: Vec<Bounds>) -> Self {
         let n = boxes.len();
         let mut depth = 0;
         while n.div_ceil(1 << depth) > LEAF {
@@ -88,16 +88,18 @@ impl BoxTree {
             boxes.par_iter().enumerate().map(|(i, b)| (b.lo[0] + b.hi[0], b.lo[1] + b.hi[1], i as u32)).collect();
         arrange(&mut keys, n, 0, 0, depth);
         let order: Vec<u32> = keys.par_iter().map(|k| k.2).collect();
-        let boxes: Vec<Bounds> = order.par_iter().map(|&i| boxes[i as usize]).collect();
+        drop(keys);
+        let ordered: Vec<Bounds> = order.par_iter().map(|&i| boxes[i as usize]).collect();
+        drop(boxes);
         let leaves = 1usize << depth;
         let mut nodes = vec![Bounds::EMPTY; 2 * leaves];
         nodes[leaves..].par_iter_mut().enumerate().for_each(|(i, node)| {
-            *node = boxes[(n * i) >> depth..(n * (i + 1)) >> depth].iter().fold(Bounds::EMPTY, |a, b| a.union(b));
+            *node = ordered[(n * i) >> depth..(n * (i + 1)) >> depth].iter().fold(Bounds::EMPTY, |a, b| a.union(b));
         });
         for i in (1..leaves).rev() {
             nodes[i] = nodes[2 * i].union(&nodes[2 * i + 1]);
         }
-        Self { order, boxes, nodes, depth }
+        Self { order, boxes: ordered, nodes, depth }
     }
 
     /// Number of items.
@@ -266,7 +268,7 @@ mod tests {
     fn search_finds_what_brute_force_finds() {
         for n in [0, 1, 7, 8, 9, 100, 1013] {
             let items = boxes(n);
-            let tree = BoxTree::new(&items);
+            let tree = BoxTree::new(items.clone());
             for query in boxes(60) {
                 let mut c = Collect { tree: &tree, query, found: vec![] };
                 tree.walk(0, &mut c);
@@ -280,7 +282,7 @@ mod tests {
     #[test]
     fn every_pair_is_met_once() {
         let items = boxes(500);
-        let tree = BoxTree::new(&items);
+        let tree = BoxTree::new(items.clone());
         let mut pairs = Vec::new();
         for position in 0..tree.len() {
             let i = tree.source(position);

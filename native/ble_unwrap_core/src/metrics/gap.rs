@@ -25,8 +25,7 @@ pub(crate) struct OwnedSegment {
 /// # Errors
 /// [`Cancelled`].
 pub(crate) fn least_gap(segments: &[OwnedSegment], limit: f64, progress: &Progress) -> Result<(f64, bool), Cancelled> {
-    let boxes: Vec<Bounds> = segments.iter().map(|s| Bounds::of(&s.ends)).collect();
-    let tree = BoxTree::new(&boxes);
+    let tree = BoxTree::new(segments.iter().map(|s| Bounds::of(&s.ends)).collect());
     let owners = node_owners(&tree, segments);
     if owners.get(1).is_none_or(|&o| o != NONE) {
         return Ok((limit, true));

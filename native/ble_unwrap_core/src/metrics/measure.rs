@@ -171,32 +171,30 @@ pub fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Cancelled
     };
     stretch(&mut out, mesh, &faces, &topology);
 
-    let mapped: Vec<usize> = (0..m).filter(|&f| topology.chart[f] != NONE).collect();
-    let triangles: Vec<[[f64; 2]; 3]> = mapped.iter().map(|&f| uv[f]).collect();
-    let island: Vec<u32> = mapped.iter().map(|&f| topology.island[f]).collect();
+    let texels = mesh.texture().texels();
+    let segment = |&h: &u32| {
+        let (f, k) = (h as usize / 3, h as usize % 3);
+        let ends = [uv[f][k], uv[f][(k + 1) % 3]].map(|p| [0, 1].map(|k| p[k] / aspect[k] * texels[k]));
+        OwnedSegment { ends, owner: topology.island[f] }
+    };
+    let segments: Vec<OwnedSegment> = topology.boundary.iter().map(segment).collect();
+    let limit = GAP_SEARCH_TEXELS.max(2.0 * mesh.texture().margin);
+    (out.gap_texels, out.gap_complete) = least_gap(&segments, limit, progress)?;
+
+    let mapped = (0..m).filter(|&f| topology.chart[f] != NONE);
+    let uv_area = mapped.map(|f| faces[f].uv_double_area.abs()).sum::<f64>() * 0.5;
+    // The search for overlaps takes most memory: nothing else should be held then.
+    drop((positions, faces, segments));
     let layout_box = extent[0].max(1e-30) * extent[1].max(1e-30);
-    let common = overlaps(&triangles, &island, OVERLAP_SHARE * layout_box, progress)?;
+    let common = overlaps(&uv, &topology.island, OVERLAP_SHARE * layout_box, progress)?;
     out.overlaps = common.pairs;
     out.overlaps_between = common.between;
     out.overlaps_complete = common.complete;
 
-    let covered = (mapped.iter().map(|&f| faces[f].uv_double_area.abs()).sum::<f64>() * 0.5 - common.area).max(0.0);
+    let covered = (uv_area - common.area).max(0.0);
     let inside = (0..2).all(|k| uv_box[0][k] >= -RANGE_SLACK && uv_box[1][k] <= 1.0 + RANGE_SLACK);
     let whole = if inside { aspect[0] * aspect[1] } else { longest_extent.max(1e-30).powi(2) };
     out.packing_efficiency = if common.complete { covered / whole } else { (covered / whole).min(1.0) };
-
-    let texels = mesh.texture().texels();
-    let segments: Vec<OwnedSegment> = topology
-        .boundary
-        .iter()
-        .map(|&h| {
-            let (f, k) = (h as usize / 3, h as usize % 3);
-            let ends = [uv[f][k], uv[f][(k + 1) % 3]].map(|p| [0, 1].map(|k| p[k] / aspect[k] * texels[k]));
-            OwnedSegment { ends, owner: topology.island[f] }
-        })
-        .collect();
-    let limit = GAP_SEARCH_TEXELS.max(2.0 * mesh.texture().margin);
-    (out.gap_texels, out.gap_complete) = least_gap(&segments, limit, progress)?;
     Ok(out)
 }
 

@@ -27,7 +27,7 @@ pub(crate) struct Overlaps {
     pub(crate) complete: bool,
 }
 
-/// Counts pairs of triangles (either orientation) with more than `threshold` of common area.
+/// Counts pairs of triangles (either orientation) with more than `threshold` of common area; NaN has none.
 ///
 /// Not exact: areas come from double-precision clipping. O(n log n + pairs), and a bounded number of
 /// pairs in any case (see [`Overlaps::complete`]).
@@ -40,19 +40,20 @@ pub(crate) fn overlaps(
     threshold: f64,
     progress: &Progress,
 ) -> Result<Overlaps, Cancelled> {
+    let twice = |f: u32| {
+        let [a, b, c] = triangles[f as usize];
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    };
     // A triangle smaller than the threshold cannot share more than it.
-    let large: Vec<([[f64; 2]; 3], u32)> = triangles
-        .par_iter()
-        .zip(group)
-        .filter_map(|(&[a, b, c], &g)| {
-            let twice = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-            let ccw = if twice < 0.0 { [c, b, a] } else { [a, b, c] };
-            (0.5 * twice.abs() > threshold).then_some((ccw, g))
-        })
-        .collect();
-    let boxes: Vec<Bounds> = large.par_iter().map(|(t, _)| Bounds::of(t)).collect();
-    let tree = BoxTree::new(&boxes);
-    let ordered: Vec<([[f64; 2]; 3], u32)> = (0..tree.len()).map(|p| large[tree.source(p)]).collect();
+    let is_large = |f: &u32| 0.5 * twice(*f).abs() > threshold;
+    let large: Vec<u32> = (0..triangles.len() as u32).into_par_iter().filter(is_large).collect();
+    let tree = BoxTree::new(large.par_iter().map(|&f| Bounds::of(&triangles[f as usize])).collect());
+    let counter_clockwise = |position: usize| {
+        let f = large[tree.source(position)];
+        let [a, b, c] = triangles[f as usize];
+        (if twice(f) < 0.0 { [c, b, a] } else { [a, b, c] }, group[f as usize])
+    };
+    let ordered: Vec<([[f64; 2]; 3], u32)> = (0..tree.len()).map(counter_clockwise).collect();
     let mut state = (Overlaps { complete: true, ..Overlaps::default() }, 0u64);
     let total_budget = 100 * ordered.len() as u64 + 50_000_000;
     in_batches(

@@ -1,12 +1,13 @@
 //! A mesh made ready to be unwrapped again and again.
 
+use std::cmp::Reverse;
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use crate::charts::{Chart, Patch};
 use crate::error::UnwrapError;
-use crate::mesh::{self, ConditionOptions, MeshInput, Surface};
+use crate::mesh::{self, ConditionOptions, FaceId, Groups, MeshInput, Surface};
 use crate::packing::PackSettings;
 use crate::progress::{Cancelled, Progress, Stage};
 use crate::settings::{ChartScale, LimitOver, Settings};
@@ -14,7 +15,7 @@ use crate::settings::{ChartScale, LimitOver, Settings};
 use super::memo::{self, Fingerprint, Kind, Memo, Run};
 use super::rungs::Rungs;
 use super::tally::Tally;
-use super::{Atlas, Clock, budget, component, finish, ribbons};
+use super::{Atlas, Clock, budget, component, finish, on_a_worker, ribbons};
 
 /// A mesh and what was found out about it, for unwrapping it several times with different settings.
 ///
@@ -40,7 +41,7 @@ impl Analysis {
     pub fn new(input: &MeshInput<'_>, weld: bool, progress: &Progress) -> Result<Self, UnwrapError> {
         progress.check()?;
         progress.enter(Stage::Condition);
-        let prepared = Prepared::new(input, weld, progress)?;
+        let prepared = on_a_worker(|| Prepared::new(input, weld, progress))?;
         Ok(Self {
             memo: Memo::new(prepared.surface.mesh.face_count()),
             prepared,
@@ -82,26 +83,27 @@ impl Analysis {
             ..MeshInput::default()
         };
         self.memo.begin();
-        self.prepared.unwrap(&input, settings, Clock::new(), &Run::new(progress, Some(&self.memo)))
+        on_a_worker(|| self.prepared.unwrap(&input, settings, Clock::new(), &Run::new(progress, Some(&self.memo))))
     }
 }
 
 /// The charts of a component, and how they came about.
 type Made = (Vec<Chart>, Rungs);
 
-/// The charts of a component, or what they were under the same settings but for those of later stages.
+/// The charts of a component, which is `faces` of the surface, or what they were under the same settings but for those of
+/// later stages.
 fn charts_of(
-    patch: &Patch,
+    whole: &Patch,
+    faces: &[FaceId],
     settings: &Settings,
     tally: &Tally<'_>,
     progress: &Run<'_>,
 ) -> Result<Arc<Made>, Cancelled> {
     let input = |f: &mut Fingerprint| {
-        f.mesh(&patch.mesh);
-        f.numbers(&patch.polygon);
+        f.mesh(&whole.mesh);
+        f.numbers(&whole.polygon);
         // They are named in the result.
-        f.indices(patch.faces.iter().map(|face| face.index()));
-        f.indices(patch.vertices.iter().map(|v| v.index()));
+        f.indices(faces.iter().map(|face| face.index()));
         f.settings(&Settings {
             limit_over: LimitOver::Chart,
             chart_scale: ChartScale::Uniform,
@@ -110,21 +112,32 @@ fn charts_of(
         });
     };
     let bytes = |made: &Made| made.0.iter().map(|c| memo::bytes_of(&c.patch.mesh) + 24 * c.uv.len()).sum();
-    progress.recall(Kind::Charts, input, bytes, || component::charts(patch, settings, tally, progress))
+    progress.recall(Kind::Charts, input, bytes, || component::charts(whole, faces, settings, tally, progress))
 }
 
-/// The surface of a mesh in connected pieces.
+/// The surface of a mesh, and its connected pieces.
 #[derive(Debug)]
 pub(super) struct Prepared {
     surface: Surface,
-    patches: Vec<Patch>,
+    /// The faces of each piece, ascending. The pieces become meshes of their own only while they are charted.
+    components: Groups<FaceId>,
 }
 
 impl Prepared {
     pub(super) fn new(input: &MeshInput<'_>, weld: bool, progress: &Progress) -> Result<Self, UnwrapError> {
         let surface = mesh::condition(input, &ConditionOptions { weld }, progress)?;
-        let patches = Patch::components(&surface.mesh, &surface.polygon);
-        Ok(Self { surface, patches })
+        let (label, count) = surface.mesh.components();
+        Ok(Self { components: Groups::by_label(&label, count, FaceId::new), surface })
+    }
+
+    /// A component as a mesh of its own, which a connected surface is already.
+    fn whole(&self, faces: &[FaceId]) -> Patch {
+        let Surface { mesh, polygon, .. } = &self.surface;
+        if faces.len() == mesh.face_count() {
+            return Patch::whole(Arc::clone(mesh), polygon.clone());
+        }
+        let (part, _) = mesh.submesh(faces, |_| false);
+        Patch::whole(Arc::new(part), faces.iter().map(|f| polygon[f.index()]).collect())
     }
 
     /// The stages after conditioning. Of `input` only positions, corners and offsets are looked at.
@@ -136,12 +149,20 @@ impl Prepared {
         progress: &Run<'_>,
     ) -> Result<Atlas, UnwrapError> {
         progress.enter(Stage::Charts);
-        let (surface, patches) = (&self.surface, &self.patches);
+        let surface = &self.surface;
         let tally = Tally::new(progress, surface.mesh.face_count());
-        let made: Vec<Result<Arc<Made>, Cancelled>> =
-            patches.par_iter().with_max_len(1).map(|patch| charts_of(patch, settings, &tally, progress)).collect();
+        let charted = |component: usize| {
+            let faces = self.components.group(component);
+            (component, charts_of(&self.whole(faces), faces, settings, &tally, progress))
+        };
+        // The largest first, so that no long one starts last.
+        let mut order: Vec<usize> = (0..self.components.len()).collect();
+        order.sort_by_key(|&component| Reverse(self.components.group(component).len()));
+        let mut made: Vec<(usize, Result<Arc<Made>, Cancelled>)> =
+            order.into_par_iter().with_max_len(1).map(charted).collect();
+        made.sort_unstable_by_key(|m| m.0);
         let (mut charts, mut rungs) = (Vec::new(), Rungs::default());
-        for component in made {
+        for (_, component) in made {
             let component = component?;
             rungs.add(&component.1);
             match Arc::try_unwrap(component) {

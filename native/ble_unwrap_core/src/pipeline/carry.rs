@@ -2,37 +2,29 @@
 
 use nalgebra::Point3;
 
-use crate::charts::{Chart, Patch};
+use crate::charts::Chart;
 use crate::mesh::{DisjointSets, FaceId, HalfedgeId, TriMesh, VertexId};
 
 use super::darts::Sewn;
 
-/// The union of parts of a fine mesh whose guides, charts of a coarse one, have been sewn: cut along the borders between
-/// the parts but where the nearest edge of the coarse border is sewn. `None` where they do not hang together.
-/// O(n log n) and a look at each coarse edge of a border for each fine one.
+/// Where the union of parts of a fine mesh is cut whose guides, charts of a coarse one, have been sewn: along the borders
+/// between the parts but where the nearest edge of the coarse border is sewn. Both sides of each edge, sorted; `None`
+/// where the parts, each of which must be connected, do not hang together. O(n log n) and a look at each coarse edge of
+/// a border for each fine one.
 pub(super) fn carried_over(
     coarse: &TriMesh,
     fine: &TriMesh,
-    polygon: &[u32],
-    pieces: &[(&Patch, &Chart)],
+    pieces: &[(&[FaceId], &Chart)],
     sewn: &Sewn,
-) -> Option<Patch> {
-    let owners = |count: usize, faces: &dyn Fn(usize) -> Vec<FaceId>| {
-        let mut owner = vec![usize::MAX; count];
-        for i in 0..pieces.len() {
-            for f in faces(i) {
-                owner[f.index()] = i;
-            }
-        }
-        owner
-    };
-    let guide = owners(coarse.face_count(), &|i| pieces[i].1.patch.faces.clone());
-    let part = owners(fine.face_count(), &|i| pieces[i].0.faces.clone());
-    let coarse_borders = borders(coarse, &guide);
+) -> Option<Vec<HalfedgeId>> {
+    let guide = owners(coarse.face_count(), pieces.iter().map(|p| &*p.1.patch.faces));
+    let part = owners(fine.face_count(), pieces.iter().map(|p| p.0));
+    let (coarse_borders, fine_borders) = (borders(coarse, &guide), borders(fine, &part));
     let mut edges: Vec<HalfedgeId> = sewn.edges.iter().flat_map(|&h| [h, coarse.twin(h)]).collect();
     edges.sort_unstable();
     let mut glued: Vec<HalfedgeId> = Vec::new();
-    for border in borders(fine, &part).chunk_by(|x, y| x.0 == y.0) {
+    let mut together = DisjointSets::new(pieces.len());
+    for border in fine_borders.chunk_by(|x, y| x.0 == y.0) {
         let from = coarse_borders.partition_point(|b| b.0 < border[0].0);
         let to = coarse_borders.partition_point(|b| b.0 <= border[0].0);
         let is_sewn = |h: HalfedgeId| {
@@ -41,19 +33,28 @@ pub(super) fn carried_over(
             nearest.is_some_and(|b| edges.binary_search(&b.1).is_ok())
         };
         let candidates: Vec<HalfedgeId> = border.iter().map(|b| b.1).filter(|&h| is_sewn(h)).collect();
-        glued.extend(longest_chain(fine, &candidates));
+        let chain = longest_chain(fine, &candidates);
+        if !chain.is_empty() {
+            together.join(border[0].0[0], border[0].0[1]);
+        }
+        glued.extend(chain);
     }
-    glued = glued.iter().flat_map(|&h| [h, fine.twin(h)]).collect();
     glued.sort_unstable();
-    let mut faces: Vec<FaceId> = pieces.iter().flat_map(|p| p.0.faces.iter().copied()).collect();
-    faces.sort_unstable();
-    let is_cut = |h: HalfedgeId| {
-        let [a, b] = [h, fine.twin(h)].map(|h| part[h.face().index()]);
-        a != b && glued.binary_search(&h).is_err()
-    };
-    let (mesh, vertices) = fine.submesh(&faces, is_cut);
-    let polygon = faces.iter().map(|f| polygon[f.index()]).collect();
-    (mesh.components().1 == 1).then_some(Patch { mesh, vertices, polygon, faces })
+    let apart = fine_borders.iter().map(|b| b.1).filter(|h| glued.binary_search(h).is_err());
+    let mut cuts: Vec<HalfedgeId> = apart.flat_map(|h| [h, fine.twin(h)]).collect();
+    cuts.sort_unstable();
+    (together.labels().1 == 1).then_some(cuts)
+}
+
+/// The number of the group that each of `count` faces is in; `usize::MAX` where it is in none.
+fn owners<'a>(count: usize, groups: impl Iterator<Item = &'a [FaceId]>) -> Vec<usize> {
+    let mut owner = vec![usize::MAX; count];
+    for (i, faces) in groups.enumerate() {
+        for f in faces {
+            owner[f.index()] = i;
+        }
+    }
+    owner
 }
 
 fn middle(mesh: &TriMesh, h: HalfedgeId) -> Point3<f64> {

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::charts::{Chart, Patch};
-use crate::mesh::{self, Coarse, FaceId, HalfedgeId};
+use crate::mesh::{self, Coarse, FaceId, Groups, HalfedgeId, TriMesh};
 use crate::progress::Cancelled;
 use crate::segmentation::{self, Segmentation};
 use crate::settings::Settings;
@@ -51,18 +51,20 @@ const LEAST_FINE_FACES: usize = 1_500;
 /// Share of the work on a component that the coarse mesh takes.
 const COARSE_WORK: f64 = 0.4;
 
-/// The charts of one component of the surface, by lowest face; faces are named as in `patch.faces`.
+/// The charts of one component of the surface, by lowest face. `whole` is the component as a patch of itself; its faces are
+/// named as in `faces`.
 pub(super) fn charts(
-    patch: &Patch,
+    whole: &Patch,
+    faces: &[FaceId],
     settings: &Settings,
     tally: &Tally<'_>,
     progress: &Run<'_>,
 ) -> Result<(Vec<Chart>, Rungs), Cancelled> {
-    let fine = Whole::new(patch.mesh.clone(), patch.polygon.clone());
-    let size = patch.faces.len() as f64;
+    let fine = Whole { patch: whole };
+    let size = faces.len() as f64;
     let mut rungs = Rungs::default();
-    let mut charts = if patch.mesh.vertex_count() > COARSE_ABOVE && settings.coarse {
-        let coarse = OnCoarse::new(&fine, settings, progress)?;
+    let mut charts = if whole.mesh.vertex_count() > COARSE_ABOVE && settings.coarse {
+        let coarse = OnCoarse::new(fine, settings, progress)?;
         let parts = coarse.parts(&mut rungs, progress)?;
         tally.add(size, COARSE_WORK);
         let done = |faces| tally.add(faces, 1.0 - COARSE_WORK);
@@ -73,21 +75,25 @@ pub(super) fn charts(
         fine.sew(charts, settings, &mut rungs, progress)?.into_iter().map(|sewn| sewn.chart).collect()
     };
     for f in charts.iter_mut().flat_map(|c| &mut c.patch.faces) {
-        *f = patch.faces[f.index()];
+        *f = faces[f.index()];
     }
     Ok((charts, rungs))
 }
 
 /// A connected mesh as a patch of itself.
-struct Whole {
-    patch: Patch,
+#[derive(Clone, Copy)]
+struct Whole<'a> {
+    patch: &'a Patch,
 }
 
-impl Whole {
-    fn new(mesh: mesh::TriMesh, polygon: Vec<u32>) -> Self {
-        let faces = mesh.faces().collect();
-        let vertices = mesh.vertices().collect();
-        Self { patch: Patch { mesh, faces, vertices, polygon } }
+impl Whole<'_> {
+    /// The patch made of some faces, cut along some edges of which both sides are given, sorted.
+    fn part(&self, faces: &[FaceId], cuts: &[HalfedgeId]) -> Patch {
+        if cuts.is_empty() && faces.len() == self.patch.faces.len() {
+            return self.patch.clone();
+        }
+        let is_cut = |h| cuts.binary_search(&h).is_ok();
+        Patch::cut_out(&self.patch.mesh, &self.patch.polygon, faces.to_vec(), is_cut)
     }
 
     /// Charts this mesh and joins charts that need not be apart.
@@ -134,10 +140,14 @@ impl Whole {
     }
 }
 
-/// A part of the fine mesh and the chart of the coarse mesh that it lies on.
+/// A part of the fine mesh and the chart of the coarse mesh that it lies on. It becomes a mesh of its own only while it is
+/// worked on.
 #[derive(Clone)]
 struct Part {
-    patch: Patch,
+    /// Ascending.
+    faces: Vec<FaceId>,
+    /// Both sides of the edges inside it along which it is cut, sorted.
+    cuts: Vec<HalfedgeId>,
     guide: Chart,
     /// The number of the guide among all, where it is not sewn.
     number: usize,
@@ -149,7 +159,7 @@ struct Part {
 
 impl Part {
     /// Whether an edge of the coarse mesh lies between two of the pieces that the guide is sewn of.
-    fn is_border(&self, coarse: &mesh::TriMesh, h: HalfedgeId) -> bool {
+    fn is_border(&self, coarse: &TriMesh, h: HalfedgeId) -> bool {
         let piece = |h: HalfedgeId| self.pieces.iter().position(|p| p.guide.patch.faces.contains(&h.face()));
         !self.pieces.is_empty() && piece(h) != piece(coarse.twin(h))
     }
@@ -164,8 +174,9 @@ enum Outcome {
 
 /// A fine mesh with its coarse one.
 struct OnCoarse<'a> {
-    fine: &'a Whole,
-    whole: Whole,
+    fine: Whole<'a>,
+    /// The coarse mesh as a patch of itself.
+    whole: Patch,
     coarse: Arc<Coarse>,
     settings: &'a Settings,
     /// For the coarse mesh.
@@ -173,7 +184,7 @@ struct OnCoarse<'a> {
 }
 
 impl<'a> OnCoarse<'a> {
-    fn new(fine: &'a Whole, settings: &'a Settings, progress: &Run<'_>) -> Result<Self, Cancelled> {
+    fn new(fine: Whole<'a>, settings: &'a Settings, progress: &Run<'_>) -> Result<Self, Cancelled> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
         let wanted = (COARSE_SHARE * fine.patch.mesh.vertex_count() as f64) as usize;
         let target = wanted.clamp(COARSE_VERTICES.0, COARSE_VERTICES.1);
@@ -185,7 +196,7 @@ impl<'a> OnCoarse<'a> {
         let coarse =
             progress.recall(Kind::Coarse, input, bytes, || mesh::coarsen(&fine.patch.mesh, target, progress))?;
         let polygon = (0..coarse.mesh.face_count()).map(|f| FaceId::new(f).index() as u32).collect();
-        let whole = Whole::new(coarse.mesh.clone(), polygon);
+        let whole = Patch::whole(Arc::new(coarse.mesh.clone()), polygon);
         let mut strict = settings.clone();
         strict.stretch_limit = 1.0 + COARSE_ALLOWANCE * (settings.stretch_limit - 1.0);
         strict.stretch.tolerance *= COARSE_TOLERANCE;
@@ -194,9 +205,10 @@ impl<'a> OnCoarse<'a> {
 
     /// Parts that flatten under the limit on the coarse mesh.
     fn parts(&self, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Vec<Part>, Cancelled> {
-        let charts = self.whole.charts(&self.strict, rungs, &|_| (), progress)?;
-        let parts = self.prolong_labels(&self.fine.patch, &charts, progress)?;
-        let sewn = self.whole.sew(charts, &self.strict, rungs, progress)?;
+        let whole = Whole { patch: &self.whole };
+        let charts = whole.charts(&self.strict, rungs, &|_| (), progress)?;
+        let parts = self.prolong_labels(self.fine.patch, &charts, progress)?;
+        let sewn = whole.sew(charts, &self.strict, rungs, progress)?;
         Ok(self.join(parts, sewn))
     }
 
@@ -211,10 +223,13 @@ impl<'a> OnCoarse<'a> {
                 continue;
             }
             let pieces: Vec<Part> = rest.iter_mut().filter(|p| mine(p)).filter_map(Option::take).collect();
-            let (coarse, fine) = (&self.coarse.mesh, &self.fine.patch);
-            let patches: Vec<(&Patch, &Chart)> = pieces.iter().map(|p| (&p.patch, &p.guide)).collect();
-            match carried_over(coarse, &fine.mesh, &fine.polygon, &patches, &sewn) {
-                Some(patch) => joined.push(Part { patch, guide: sewn.chart, number: usize::MAX, pieces, family: None }),
+            let borders: Vec<(&[FaceId], &Chart)> = pieces.iter().map(|p| (&*p.faces, &p.guide)).collect();
+            match carried_over(&self.coarse.mesh, &self.fine.patch.mesh, &borders, &sewn) {
+                Some(cuts) => {
+                    let mut faces: Vec<FaceId> = pieces.iter().flat_map(|p| p.faces.iter().copied()).collect();
+                    faces.sort_unstable();
+                    joined.push(Part { faces, cuts, guide: sewn.chart, number: usize::MAX, pieces, family: None });
+                }
                 None => joined.extend(pieces),
             }
         }
@@ -247,17 +262,19 @@ impl<'a> OnCoarse<'a> {
             |s: &Segmentation| 4 * s.label.len(),
             || segmentation::straighten(&patch.mesh, &patch.polygon, &label, BAND_RINGS, crease_weight, progress),
         )?;
-        let guide_of = |part: &Patch| {
+        let guide_of = |faces: &[FaceId]| {
             let mut votes = vec![0usize; charts.len()];
-            part.faces.iter().map(under).filter(|n| *n != NONE).for_each(|n| votes[n as usize] += 1);
+            faces.iter().map(under).filter(|n| *n != NONE).for_each(|n| votes[n as usize] += 1);
             let best = votes.iter().enumerate().max_by_key(|&(i, n)| (*n, Reverse(i)));
             best.map_or(0, |b| b.0)
         };
-        let part = |patch: Patch| {
-            let number = guide_of(&patch);
-            Part { guide: charts[number].clone(), number, patch, pieces: Vec::new(), family: None }
+        let part = |faces: &[FaceId]| {
+            let number = guide_of(faces);
+            let (faces, guide) = (faces.to_vec(), charts[number].clone());
+            Part { faces, cuts: Vec::new(), guide, number, pieces: Vec::new(), family: None }
         };
-        Ok(patch.split(&parts.label, parts.parts).into_iter().map(part).collect())
+        let groups = Groups::by_label(&parts.label, parts.parts, |i| patch.faces[i]);
+        Ok(groups.iter().map(part).collect())
     }
 
     /// Flattens the parts from where the coarse charts are. Those over the limit are split on the coarse mesh, those
@@ -274,7 +291,7 @@ impl<'a> OnCoarse<'a> {
         let mut accepted: Vec<(Chart, Option<u32>)> = Vec::new();
         let mut split_count = 0;
         while !open.is_empty() {
-            open.sort_by_key(|p| (Reverse(p.patch.faces.len()), p.patch.faces[0]));
+            open.sort_by_key(|p| (Reverse(p.faces.len()), p.faces[0]));
             let outcomes: Vec<Result<(Outcome, Rungs), Cancelled>> = open
                 .par_iter()
                 .with_max_len(1)
@@ -282,7 +299,7 @@ impl<'a> OnCoarse<'a> {
                     let mut rungs = Rungs::default();
                     let outcome = self.step(part, &mut rungs, progress)?;
                     if matches!(outcome, Outcome::Accept(_)) {
-                        done(part.patch.faces.len() as f64);
+                        done(part.faces.len() as f64);
                     }
                     Ok((outcome, rungs))
                 })
@@ -293,7 +310,7 @@ impl<'a> OnCoarse<'a> {
                 rungs.add(&steps);
                 match outcome {
                     Outcome::Accept(chart) => accepted.push((*chart, part.family)),
-                    Outcome::Fine => rest.push(part.patch),
+                    Outcome::Fine => rest.push(self.fine.part(&part.faces, &part.cuts)),
                     Outcome::Split(mut parts) => {
                         let halves = parts.len() == 2;
                         for part in &mut parts {
@@ -320,7 +337,8 @@ impl<'a> OnCoarse<'a> {
     fn step(&self, part: &Part, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Outcome, Cancelled> {
         progress.check()?;
         let done = |h: HalfedgeId| part.is_border(&self.coarse.mesh, h);
-        if let Some(Prolonged { patch, start }) = prolong(&self.coarse, &part.guide, &part.patch, done)
+        let on_fine = || self.fine.part(&part.faces, &part.cuts);
+        if let Some(Prolonged { patch, start }) = prolong(&self.coarse, &part.guide, on_fine(), done)
             && let Polished::Flat(flat) =
                 flatten::polish(&patch, &start, Rung::Prolonged, self.settings, rungs, progress)?
         {
@@ -330,23 +348,22 @@ impl<'a> OnCoarse<'a> {
             return Ok(Outcome::Split(part.pieces.clone()));
         }
         let mut faces = part.guide.patch.faces.clone();
-        if faces.len() <= LEAST_COARSE_FACES || part.patch.faces.len() <= LEAST_FINE_FACES {
+        if faces.len() <= LEAST_COARSE_FACES || part.faces.len() <= LEAST_FINE_FACES {
             return Ok(Outcome::Fine);
         }
         faces.sort_unstable();
-        let (mesh, polygon) = (&self.whole.patch.mesh, &self.whole.patch.polygon);
-        let patch = Patch::of_surface(mesh, polygon, faces);
+        let patch = Patch::of_surface(&self.whole.mesh, &self.whole.polygon, faces);
         let patches = charting::split(&patch, &self.strict, rungs, progress)?;
         let charting = charting::chart(patches, &self.strict, &|_| (), progress)?;
         rungs.add(&charting.rungs);
-        let parts = self.prolong_labels(&part.patch, &charting.charts, progress)?;
+        let parts = self.prolong_labels(&on_fine(), &charting.charts, progress)?;
         // Straightening may have given one label all.
         Ok(if parts.len() < 2 { Outcome::Fine } else { Outcome::Split(parts) })
     }
 }
 
 /// Gives faces without a label that of a neighbour, a ring at a time; 0 if nobody has any.
-fn spread_labels(mesh: &mesh::TriMesh, label: &mut [u32]) {
+fn spread_labels(mesh: &TriMesh, label: &mut [u32]) {
     let mut front: Vec<FaceId> = mesh.faces().filter(|f| label[f.index()] != u32::MAX).collect();
     while !front.is_empty() {
         let mut next = Vec::new();

@@ -263,14 +263,12 @@ impl Table<'_> {
                 sewn.binary_search(&h).is_err()
             }
         };
-        let (part, vertices) = mesh.submesh(&faces, is_cut);
         let draw = |f: &FaceId| {
             let place = f.halfedges().map(|h| self.place(h));
             if self.owner[f.index()].0 == seam.pieces[1] { place.map(|p| seam.motion.apply(p)) } else { place }
         };
         let drawn: Vec<[Point2<f64>; 3]> = faces.iter().map(draw).collect();
-        let polygon = faces.iter().map(|f| self.polygon[f.index()]).collect();
-        (Patch { mesh: part, vertices, polygon, faces }, drawn)
+        (Patch::cut_out(mesh, self.polygon, faces, is_cut), drawn)
     }
 
     fn replace(&mut self, seam: &Seam, chart: Chart) {
@@ -396,12 +394,12 @@ mod tests {
         let mesh = test_surfaces::sphere(3);
         let settings = settings(1.1);
         let halves = charts(&mesh, &settings, hemisphere);
-        let patches: Vec<Patch> = halves.iter().map(|c| c.patch.clone()).collect();
         let (sewn, _) = sewn(&mesh, halves.clone(), &settings);
-        let pieces: Vec<(&Patch, &Chart)> = patches.iter().zip(&halves).collect();
-        let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
-        let patch = carried_over(&mesh, &mesh, &polygon, &pieces, &sewn[0]).expect("it hangs together");
-        assert_eq!(patch.mesh.topology(), sewn[0].chart.patch.mesh.topology());
-        assert_eq!(patch.faces, sewn[0].chart.patch.faces);
+        let pieces: Vec<(&[FaceId], &Chart)> = halves.iter().map(|c| (&*c.patch.faces, c)).collect();
+        let cuts = carried_over(&mesh, &mesh, &pieces, &sewn[0]).expect("it hangs together");
+        let all: Vec<FaceId> = mesh.faces().collect();
+        let open = mesh.submesh(&all, |h| cuts.binary_search(&h).is_ok()).0;
+        assert_eq!(open.topology(), sewn[0].chart.patch.mesh.topology());
+        assert_eq!(all, sewn[0].chart.patch.faces);
     }
 }

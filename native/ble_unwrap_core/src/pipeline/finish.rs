@@ -63,6 +63,8 @@ pub(super) fn finish(
             certificate.faulty_charts.iter().filter_map(|&c| usize::try_from(c).ok()).collect();
         round += 1;
         if (faulty.is_empty() && layout.broken.is_empty()) || round == MOST_ROUNDS {
+            // Nothing is left to mend.
+            drop(charts);
             let measures = metrics::measure(&mesh, progress)?;
             clock.lap("verify");
             let mut report = Report::new(&measures, settings.chart_limit());
@@ -138,16 +140,16 @@ fn enlargement(chart: &Chart, factor: f64) -> f64 {
 }
 
 /// The input as one list of triangles, for the checks.
-struct Arrays {
+struct Arrays<'a> {
     positions: Vec<Point3<f64>>,
     triangles: Vec<[u32; 3]>,
-    corner_triangles: Vec<[u32; 3]>,
+    corner_triangles: &'a [[u32; 3]],
 }
 
-impl Arrays {
+impl<'a> Arrays<'a> {
     /// `weld` as the surface was made with it, so that edges count as seams where it has them.
-    fn new(input: &MeshInput<'_>, surface: &Surface, weld: bool) -> Self {
-        let corner_triangles: Vec<[u32; 3]> = surface.corner.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
+    fn new(input: &MeshInput<'_>, surface: &'a Surface, weld: bool) -> Self {
+        let corner_triangles = surface.corner.as_chunks().0;
         let vertex = |c: u32| u32::try_from(input.corner_vertices[c as usize]).unwrap_or(0);
         let mut triangles: Vec<[u32; 3]> = corner_triangles.iter().map(|c| c.map(vertex)).collect();
         if weld {
@@ -159,10 +161,10 @@ impl Arrays {
         Self { positions: input.positions.iter().map(|&p| Point3::from(p)).collect(), triangles, corner_triangles }
     }
 
-    fn uv_mesh<'a>(&'a self, layout: &'a Layout, settings: &Settings) -> Result<UvMesh<'a>, UvMeshError> {
+    fn uv_mesh<'b>(&'b self, layout: &'b Layout, settings: &Settings) -> Result<UvMesh<'b>, UvMeshError> {
         let pack = &settings.packing;
         let texture = Texture { width: pack.width, height: pack.height, margin: pack.margin_texels };
-        let (positions, triangles, corners) = (&self.positions, &self.triangles, &self.corner_triangles);
+        let (positions, triangles, corners) = (&self.positions, &self.triangles, self.corner_triangles);
         UvMesh::new(positions, triangles, &layout.uv, corners, &layout.face_chart, texture)
     }
 }

@@ -31,7 +31,7 @@ pub(super) struct Prolonged {
 pub(super) fn prolong(
     coarse: &Coarse,
     chart: &Chart,
-    part: &Patch,
+    part: Patch,
     done: impl Fn(HalfedgeId) -> bool,
 ) -> Option<Prolonged> {
     let mut local = vec![FaceId::NONE; coarse.mesh.face_count()];
@@ -39,7 +39,7 @@ pub(super) fn prolong(
         local[f.index()] = FaceId::new(i);
     }
     let cuts = coarse_cuts(coarse, chart, &local, done);
-    let patch = if cuts.edges.is_empty() { part.clone() } else { part.cut(&fine_cuts(coarse, part, &cuts)) };
+    let patch = if cuts.edges.is_empty() { part } else { part.cut(&fine_cuts(coarse, &part, &cuts)) };
     let topology = patch.mesh.topology();
     if !topology.is_chart() || topology.loops != chart.patch.mesh.topology().loops {
         return None;

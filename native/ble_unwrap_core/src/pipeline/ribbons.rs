@@ -158,6 +158,8 @@ fn with_positions(
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
     use crate::Progress;
     use crate::mesh::test_surfaces;
@@ -166,7 +168,7 @@ mod tests {
     fn sheet(length: usize) -> Chart {
         let mesh = test_surfaces::grid(length, 2, [length as f64, 2.0], 0.0);
         let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
-        let patch = Patch::components(&mesh, &polygon).remove(0);
+        let patch = Patch::whole(Arc::new(mesh), polygon);
         let uv = patch.mesh.positions().iter().map(|p| p.xy()).collect();
         Chart { patch, uv, l2: 1.0 }
     }
@@ -197,7 +199,7 @@ mod tests {
         assert_eq!(cut_up(vec![sheet(10)]).len(), 1);
         let mesh = test_surfaces::grid(10, 10, [60.0, 60.0], 0.0);
         let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
-        let patch = Patch::components(&mesh, &polygon).remove(0);
+        let patch = Patch::whole(Arc::new(mesh), polygon);
         let uv = patch.mesh.positions().iter().map(|p| p.xy()).collect();
         assert_eq!(cut_up(vec![sheet(80), Chart { patch, uv, l2: 1.0 }]).len(), 2);
     }

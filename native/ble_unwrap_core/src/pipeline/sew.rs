@@ -156,8 +156,7 @@ impl Sides<'_> {
             let inside = side.halfedge(h).is_some_and(|local| !side.mesh().is_boundary(local));
             !inside && sewn.binary_search(&h).is_err() && sewn.binary_search(&self.mesh.twin(h)).is_err()
         };
-        let (mesh, vertices) = self.mesh.submesh(&faces, is_cut);
-        Patch { mesh, vertices, polygon: faces.iter().map(|f| polygon[f.index()]).collect(), faces }
+        Patch::cut_out(self.mesh, polygon, faces, is_cut)
     }
 
     /// Where each face of the union is drawn, the second chart laid against the first.

@@ -107,25 +107,31 @@ impl FoldoverEnergy {
     }
 }
 
-/// Gradients of a rest triangle's barycentric coordinates: J = Σ pₖ gₖᵀ for corners pₖ in the plane.
+/// Gradients of a rest triangle's barycentric coordinates: J = Σ pₖ gₖᵀ for corners pₖ in the plane. That of the third
+/// corner is (0, `up`), and all three add up to nothing.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct HatGradients {
-    g: [Vector2<f64>; 3],
+    second: Vector2<f64>,
+    up: f64,
 }
 
 impl HatGradients {
     pub(super) fn new(rest: &RestTriangle) -> Self {
-        let g1 = Vector2::new(1.0 / rest.x1, -rest.x2 / (rest.x1 * rest.y2));
-        let g2 = Vector2::new(0.0, 1.0 / rest.y2);
-        Self { g: [-(g1 + g2), g1, g2] }
+        Self { second: Vector2::new(1.0 / rest.x1, -rest.x2 / (rest.x1 * rest.y2)), up: 1.0 / rest.y2 }
+    }
+
+    #[inline]
+    fn of_corners(&self) -> [Vector2<f64>; 3] {
+        let third = Vector2::new(0.0, self.up);
+        [-(self.second + third), self.second, third]
     }
 
     /// Jacobian of the map that takes the rest triangle to a triangle with edges `d1`, `d2` from its
     /// first corner; also of a displacement field.
     #[inline]
     pub(super) fn jacobian(&self, d1: Vector2<f64>, d2: Vector2<f64>) -> Matrix2<f64> {
-        let (a, b) = (self.g[1], self.g[2]);
-        Matrix2::new(d1.x * a.x + d2.x * b.x, d1.x * a.y + d2.x * b.y, d1.y * a.x + d2.y * b.x, d1.y * a.y + d2.y * b.y)
+        let (a, up) = (self.second, self.up);
+        Matrix2::new(d1.x * a.x, d1.x * a.y + d2.x * up, d1.y * a.x, d1.y * a.y + d2.y * up)
     }
 }
 
@@ -170,7 +176,7 @@ pub(super) fn face_derivatives<E: IsotropicEnergy>(
     let (same, cross) = (0.5 * (twist + flip), 0.5 * (flip - twist));
 
     // In the frame of U, corner k moves stretch 1 by g·v₁ along the first axis, and so on.
-    let v = hat.g.map(|g| Vector2::new(ct * g.x - st * g.y, st * g.x + ct * g.y));
+    let v = hat.of_corners().map(|g| Vector2::new(ct * g.x - st * g.y, st * g.x + ct * g.y));
     let out = |x: f64, y: f64| Vector2::new(cp * x - sp * y, sp * x + cp * y);
     let block = |k: usize, l: usize| {
         let (k, l) = (v[k], v[l]);

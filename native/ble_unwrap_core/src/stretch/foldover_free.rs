@@ -87,7 +87,7 @@ fn clear(
     let mut energy = FoldoverEnergy { epsilon: 1.0 };
     let mut before_round = usize::MAX;
     for iteration in 0..MAX_ITERATIONS {
-        if first_flip(mesh, &uv).is_none() && system.least_determinant(&uv) >= least {
+        if first_flip(mesh, &uv).is_none() && system.faces.least_determinant(&uv) >= least {
             return Ok(Some(uv));
         }
         if iteration % ROUND == 0 {
@@ -98,14 +98,14 @@ fn clear(
             before_round = flips;
         }
         progress.check()?;
-        let before = system.value(&energy, &uv);
+        let before = system.faces.value(&energy, &uv);
         system.assemble(&energy, &uv);
         let Some(slope) = system.solve_pinned(pinned, &mut direction) else { break };
         let mut step = 1.0;
         let mut after = before;
         for _ in 0..MAX_HALVINGS {
             advance(&uv, &direction, step, &mut trial);
-            let value = system.value(&energy, &trial);
+            let value = system.faces.value(&energy, &trial);
             if value <= before + ARMIJO * step * slope {
                 std::mem::swap(&mut uv, &mut trial);
                 after = value;
@@ -115,7 +115,7 @@ fn clear(
         }
         // Equation 7 of the paper.
         let sigma = (1.0 - after / before).max(LEAST_PROGRESS);
-        let worst = system.least_determinant(&uv);
+        let worst = system.faces.least_determinant(&uv);
         let root = worst.hypot(energy.epsilon);
         energy.epsilon *= if worst >= 0.0 { 1.0 - sigma } else { 1.0 - sigma * root / (worst.abs() + root) };
     }

@@ -198,7 +198,6 @@ pub fn minimise_stretch(
         Solver::LineSearch => line_search::minimise(mesh, rest, start, settings, options, progress)?,
     };
     let scale = (surface_area(rest) / plane_area(mesh, &result.uv)).sqrt();
-    let mut scratch = result.uv.clone();
-    newton::rescale(mesh, &mut result.uv, scale, &mut scratch, options.keep_apart.is_some());
+    newton::rescale(mesh, &mut result.uv, scale, options.keep_apart.is_some());
     Ok(result)
 }

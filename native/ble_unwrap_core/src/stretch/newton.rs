@@ -63,9 +63,8 @@ pub(super) fn minimise(
     progress: &Progress,
 ) -> Result<Minimised, StretchError> {
     let mut uv = start.to_vec();
-    let mut scratch = uv.clone();
     let scale = (surface_area(rest) / plane_area(mesh, &uv)).sqrt();
-    rescale(mesh, &mut uv, scale, &mut scratch, options.keep_apart.is_some());
+    rescale(mesh, &mut uv, scale, options.keep_apart.is_some());
     let energy = StretchEnergy::new(settings.dirichlet_weight);
     let warm = StretchEnergy::new(settings.dirichlet_weight.max(0.5));
     relax_worst(mesh, rest, &mut uv, &warm, options.keep_apart.is_some(), progress)?;
@@ -79,11 +78,11 @@ pub(super) fn minimise(
         early: Vec::new(),
         converged: false,
     };
-    let mut l2 = descent.system.stretch_sums(&descent.uv).l2();
+    let mut l2 = descent.system.faces.stretch_sums(&descent.uv).l2();
     let tolerance = if descent.barrier.is_some() { APART_TOLERANCE } else { 1.0 } * settings.tolerance;
     for iteration in 0..settings.max_iterations {
         progress.check()?;
-        let warm_up = iteration < WARM_UP && descent.system.value(&energy, &descent.uv) > WARM_UP_ABOVE;
+        let warm_up = iteration < WARM_UP && descent.system.faces.value(&energy, &descent.uv) > WARM_UP_ABOVE;
         let step = descent.step(mesh, if warm_up { &warm } else { &energy });
         let Some((before, after)) = step else {
             // No way down is left that rounding does not swallow.
@@ -92,7 +91,7 @@ pub(super) fn minimise(
         };
         result.iterations = iteration + 1;
         let l2_before = l2;
-        l2 = descent.system.stretch_sums(&descent.uv).l2();
+        l2 = descent.system.faces.stretch_sums(&descent.uv).l2();
         if !warm_up && before - after <= tolerance * after {
             result.converged = true;
             break;
@@ -110,12 +109,14 @@ pub(super) fn minimise(
             }
         }
     }
-    result.uv = descent.uv;
+    // What follows has systems of its own: this one is not held beside them.
+    let Descent { system: ChartSystem { faces, .. }, uv, .. } = descent;
+    result.uv = uv;
     result.l2 = l2;
     if !result.abandoned {
         let mut relaxed = result.uv.clone();
         relax_worst(mesh, rest, &mut relaxed, &warm, options.keep_apart.is_some(), progress)?;
-        let l2 = descent.system.stretch_sums(&relaxed).l2();
+        let l2 = faces.stretch_sums(&relaxed).l2();
         // The average has converged long before a few small triangles have.
         if l2 <= result.l2 {
             result.uv = relaxed;
@@ -167,8 +168,8 @@ fn relax_worst(
 }
 
 /// Everything one Newton step works on.
-struct Descent {
-    system: ChartSystem,
+struct Descent<'a> {
+    system: ChartSystem<'a>,
     barrier: Option<Barrier>,
     /// Vertices that stay; none if empty.
     pinned: Vec<bool>,
@@ -177,10 +178,10 @@ struct Descent {
     direction: Vec<f64>,
 }
 
-impl Descent {
+impl<'a> Descent<'a> {
     /// From a map at the scale it is to be minimised at.
     fn new(
-        mesh: &TriMesh,
+        mesh: &'a TriMesh,
         rest: &[RestTriangle],
         uv: Vec<Point2<f64>>,
         pinned: Vec<bool>,
@@ -192,7 +193,7 @@ impl Descent {
     }
 
     fn value(&self, energy: &StretchEnergy, uv: &[Point2<f64>]) -> f64 {
-        let own = self.system.value(energy, uv);
+        let own = self.system.faces.value(energy, uv);
         match &self.barrier {
             Some(barrier) if own.is_finite() => own + barrier.value(uv),
             _ => own,
@@ -207,7 +208,7 @@ impl Descent {
             barrier.assemble(&self.uv, &mut self.system);
         }
         let slope = self.system.solve_pinned(&self.pinned, &mut self.direction)?;
-        let mut step = (SAFETY * self.system.first_flip(&self.uv, &self.direction)).min(1.0);
+        let mut step = (SAFETY * self.system.faces.first_flip(&self.uv, &self.direction)).min(1.0);
         if let Some(barrier) = &self.barrier {
             step = step.min(SAFETY * barrier.first_contact(&self.uv, &self.direction, step / SAFETY));
         }
@@ -229,22 +230,14 @@ impl Descent {
 }
 
 /// Scales all of `uv`, unless rounding would flip a triangle or, where that matters, make the boundary
-/// touch itself; `scratch` has the same length.
-pub(super) fn rescale(
-    mesh: &TriMesh,
-    uv: &mut [Point2<f64>],
-    scale: f64,
-    scratch: &mut [Point2<f64>],
-    keep_boundary_simple: bool,
-) {
+/// touch itself.
+pub(super) fn rescale(mesh: &TriMesh, uv: &mut Vec<Point2<f64>>, scale: f64, keep_boundary_simple: bool) {
     if !(scale.is_finite() && scale > 0.0) {
         return;
     }
-    for (s, p) in scratch.iter_mut().zip(uv.iter()) {
-        *s = p * scale;
-    }
-    if first_flip(mesh, scratch).is_none() && (!keep_boundary_simple || boundary_is_simple(mesh, scratch)) {
-        uv.copy_from_slice(scratch);
+    let scaled: Vec<Point2<f64>> = uv.iter().map(|p| p * scale).collect();
+    if first_flip(mesh, &scaled).is_none() && (!keep_boundary_simple || boundary_is_simple(mesh, &scaled)) {
+        *uv = scaled;
     }
 }
 

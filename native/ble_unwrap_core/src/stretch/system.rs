@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, Point2, Vector2};
 use super::energy::{HatGradients, IsotropicEnergy, face_derivatives};
 use crate::distortion::RestTriangle;
 use crate::linalg::{RoughCholesky, SparseError, SparsePattern};
-use crate::mesh::{HalfedgeId, TriMesh};
+use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 
 /// Relative weight added to each diagonal entry of the Hessian, which is singular for translations
 /// and rotations. Far below any mode that matters, far above rounding (1e-16 times the row count).
@@ -19,20 +19,20 @@ const RIDGE_ATTEMPTS: usize = 7;
 /// is measured by the mean, to anything that counts.
 const PIN_STIFFNESS: f64 = 1e4;
 
-/// A chart's triangles with everything that does not change between Newton steps: hat gradients,
-/// area weights (summing to one), the place of every block in the sparse matrix, the analysed factor.
-pub(super) struct ChartSystem {
-    triangles: Vec<[u32; 3]>,
+/// A chart's triangles with what an energy needs of each: hat gradients, and area weights, which sum to one.
+pub(super) struct ChartFaces<'a> {
+    triangles: &'a [[VertexId; 3]],
     hats: Vec<HatGradients>,
     weights: Vec<f64>,
+}
+
+/// A chart's triangles with everything that does not change between Newton steps: the place of every block in the sparse
+/// matrix, the analysed factor.
+pub(super) struct ChartSystem<'a> {
+    pub(super) faces: ChartFaces<'a>,
     /// For each half-edge, where the block of its two ends begins.
     across: Vec<[u32; 3]>,
-    /// For each vertex, where its diagonal block begins.
-    diagonal: Vec<u32>,
-    /// For each vertex, how far its second column lies behind its first.
-    stride: Vec<u32>,
-    /// Where the scalar diagonal entries are, and what was assembled there before the ridge.
-    diagonal_entries: Vec<u32>,
+    /// What was assembled on the diagonal before the ridge.
     base_diagonal: Vec<f64>,
     solver: RoughCholesky,
     hessian: Vec<f64>,
@@ -55,39 +55,19 @@ impl StretchSums {
     }
 }
 
-impl ChartSystem {
-    /// Analyses the Hessian's pattern. O(n log n), a third of a factorisation.
-    pub(super) fn new(mesh: &TriMesh, rest: &[RestTriangle]) -> Result<Self, SparseError> {
+impl<'a> ChartFaces<'a> {
+    fn new(mesh: &'a TriMesh, rest: &[RestTriangle]) -> Self {
         let total: f64 = rest.iter().map(RestTriangle::area).sum();
-        let triangles: Vec<[u32; 3]> = mesh.triangles().iter().map(|t| t.map(|v| v.index() as u32)).collect();
-        let pairs = triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
-        let vertices = SparsePattern::from_pairs(mesh.vertex_count(), pairs);
-        let solver = RoughCholesky::analyse(&vertices)?;
-        let pattern = solver.pattern();
-        let place = |i: u32, j: u32| {
-            pattern.position(2 * i.min(j) as usize, 2 * i.max(j) as usize).map_or(u32::MAX, |p| p as u32)
-        };
-        let across = triangles.iter().map(|&[a, b, c]| [place(a, b), place(b, c), place(c, a)]).collect();
-        let diagonal: Vec<u32> = (0..mesh.vertex_count() as u32).map(|v| place(v, v)).collect();
-        let stride: Vec<u32> = (0..mesh.vertex_count()).map(|v| pattern.column(2 * v).len() as u32).collect();
-        Ok(Self {
+        Self {
+            triangles: mesh.triangles(),
             hats: rest.iter().map(HatGradients::new).collect(),
             weights: rest.iter().map(|r| r.area() / total).collect(),
-            across,
-            diagonal_entries: diagonal.iter().zip(&stride).flat_map(|(&d, &s)| [d, d + s + 1]).collect(),
-            base_diagonal: vec![0.0; 2 * mesh.vertex_count()],
-            diagonal,
-            stride,
-            hessian: vec![0.0; pattern.entry_count()],
-            gradient: vec![0.0; 2 * mesh.vertex_count()],
-            triangles,
-            solver,
-        })
+        }
     }
 
     #[inline]
     fn jacobian(&self, face: usize, uv: &[Point2<f64>]) -> Matrix2<f64> {
-        let [p, q, r] = self.triangles[face].map(|v| uv[v as usize]);
+        let [p, q, r] = self.triangles[face].map(|v| uv[v.index()]);
         self.hats[face].jacobian(q - p, r - p)
     }
 
@@ -118,16 +98,67 @@ impl ChartSystem {
         (0..self.triangles.len()).map(|f| self.jacobian(f, uv).determinant()).fold(f64::INFINITY, f64::min)
     }
 
+    /// The greatest step along `direction` at which no triangle has collapsed yet; infinite if none
+    /// ever does. `uv` must have positive triangles.
+    pub(super) fn first_flip(&self, uv: &[Point2<f64>], direction: &[f64]) -> f64 {
+        let mut least = f64::INFINITY;
+        for t in self.triangles {
+            let [p, q, r] = t.map(|v| uv[v.index()]);
+            let along = |v: VertexId| Vector2::new(direction[2 * v.index()], direction[2 * v.index() + 1]);
+            let [dp, dq, dr] = t.map(along);
+            let (e, f, de, df) = (q - p, r - p, dq - dp, dr - dp);
+            let (c, b, a) = (e.perp(&f), e.perp(&df) + de.perp(&f), de.perp(&df));
+            // Smallest positive root of a t² + b t + c, c > 0, in the form that does not cancel.
+            let discriminant = b * b - 4.0 * a * c;
+            if discriminant >= 0.0 {
+                let denominator = discriminant.sqrt() - b;
+                if denominator > 0.0 {
+                    least = least.min(2.0 * c / denominator);
+                }
+            }
+        }
+        least
+    }
+}
+
+impl<'a> ChartSystem<'a> {
+    /// Analyses the Hessian's pattern. O(n log n), a third of a factorisation.
+    pub(super) fn new(mesh: &'a TriMesh, rest: &[RestTriangle]) -> Result<Self, SparseError> {
+        let ends = |h: HalfedgeId| [mesh.from(h), mesh.to(h)].map(|v| v.index() as u32).into();
+        let solver = RoughCholesky::analyse(SparsePattern::from_pairs(mesh.vertex_count(), mesh.edges().map(ends)))?;
+        let pattern = solver.pattern();
+        let place = |v: VertexId, w: VertexId| {
+            let (v, w) = (v.index(), w.index());
+            pattern.position(2 * v.min(w), 2 * v.max(w)).map_or(u32::MAX, |p| p as u32)
+        };
+        let across = mesh.triangles().iter().map(|&[a, b, c]| [place(a, b), place(b, c), place(c, a)]).collect();
+        Ok(Self {
+            faces: ChartFaces::new(mesh, rest),
+            across,
+            base_diagonal: vec![0.0; pattern.size()],
+            hessian: vec![0.0; pattern.entry_count()],
+            gradient: vec![0.0; pattern.size()],
+            solver,
+        })
+    }
+
+    /// Where the diagonal block of a vertex begins, and how far its second column lies behind its first.
+    #[inline]
+    fn block(&self, vertex: usize) -> (usize, usize) {
+        let pattern = self.solver.pattern();
+        (pattern.diagonal(2 * vertex), pattern.column(2 * vertex).len())
+    }
+
     /// Gradient and projected Hessian of the energy at `uv`. O(faces).
     pub(super) fn assemble<E: IsotropicEnergy>(&mut self, energy: &E, uv: &[Point2<f64>]) {
         self.hessian.fill(0.0);
         self.gradient.fill(0.0);
-        for face in 0..self.triangles.len() {
-            let d = face_derivatives(energy, &self.hats[face], &self.jacobian(face, uv));
-            let (t, w) = (self.triangles[face], self.weights[face]);
+        for face in 0..self.faces.triangles.len() {
+            let d = face_derivatives(energy, &self.faces.hats[face], &self.faces.jacobian(face, uv));
+            let (t, w) = (self.faces.triangles[face], self.faces.weights[face]);
             for k in 0..3 {
-                self.add_gradient(t[k], d.gradient[k] * w);
-                self.add_diagonal(t[k], &(d.diagonal[k] * w));
+                self.add_gradient(t[k].index() as u32, d.gradient[k] * w);
+                self.add_diagonal(t[k].index() as u32, &(d.diagonal[k] * w));
                 self.add_across(face, k, &(d.across[k] * w));
             }
         }
@@ -143,7 +174,7 @@ impl ChartSystem {
     /// Adds a symmetric block to the diagonal of the Hessian.
     #[inline]
     pub(super) fn add_diagonal(&mut self, vertex: u32, m: &Matrix2<f64>) {
-        let (at, stride) = (self.diagonal[vertex as usize] as usize, self.stride[vertex as usize] as usize);
+        let (at, stride) = self.block(vertex as usize);
         self.hessian[at] += m.m11;
         self.hessian[at + stride] += m.m12;
         self.hessian[at + stride + 1] += m.m22;
@@ -152,8 +183,9 @@ impl ChartSystem {
     /// Adds the block whose rows belong to the start and whose columns belong to the end of a half-edge.
     #[inline]
     fn add_across(&mut self, face: usize, slot: usize, m: &Matrix2<f64>) {
-        let (from, to) = (self.triangles[face][slot], self.triangles[face][(slot + 1) % 3]);
-        let (at, stride) = (self.across[face][slot] as usize, self.stride[from.max(to) as usize] as usize);
+        let triangle = self.faces.triangles[face];
+        let (from, to) = (triangle[slot], triangle[(slot + 1) % 3]);
+        let (at, stride) = (self.across[face][slot] as usize, self.block(from.max(to).index()).1);
         let (m12, m21) = if from < to { (m.m12, m.m21) } else { (m.m21, m.m12) };
         self.hessian[at] += m.m11;
         self.hessian[at + 1] += m21;
@@ -178,15 +210,15 @@ impl ChartSystem {
         // Where all eigenvalues round a vertex are clamped its entries vanish, so the ridge is
         // measured by the mean entry too.
         let mut mean = 0.0;
-        for (base, &at) in self.base_diagonal.iter_mut().zip(&self.diagonal_entries) {
-            *base = self.hessian[at as usize];
+        for (i, base) in self.base_diagonal.iter_mut().enumerate() {
+            *base = self.hessian[self.solver.pattern().diagonal(i)];
             mean += *base;
         }
         mean /= self.base_diagonal.len().max(1) as f64;
         let mut ridge = RIDGE;
         for _ in 0..RIDGE_ATTEMPTS {
-            for (base, &at) in self.base_diagonal.iter().zip(&self.diagonal_entries) {
-                self.hessian[at as usize] = base + ridge * (base + mean);
+            for (i, base) in self.base_diagonal.iter().enumerate() {
+                self.hessian[self.solver.pattern().diagonal(i)] = base + ridge * (base + mean);
             }
             if self.solver.refactor(&self.hessian).is_ok() {
                 for (d, g) in direction.iter_mut().zip(&self.gradient) {
@@ -211,7 +243,7 @@ impl ChartSystem {
         for (v, _) in pinned.iter().enumerate().filter(|p| *p.1) {
             for k in [2 * v, 2 * v + 1] {
                 self.gradient[k] = 0.0;
-                self.hessian[self.diagonal_entries[k] as usize] *= PIN_STIFFNESS;
+                self.hessian[self.solver.pattern().diagonal(k)] *= PIN_STIFFNESS;
             }
         }
         // Without gradient there the slope is the same, and the direction remains one of descent.
@@ -220,27 +252,6 @@ impl ChartSystem {
             direction[2 * v..2 * v + 2].fill(0.0);
         }
         slope
-    }
-
-    /// The greatest step along `direction` at which no triangle has collapsed yet; infinite if none
-    /// ever does. `uv` must have positive triangles.
-    pub(super) fn first_flip(&self, uv: &[Point2<f64>], direction: &[f64]) -> f64 {
-        let mut least = f64::INFINITY;
-        for t in &self.triangles {
-            let [p, q, r] = t.map(|v| uv[v as usize]);
-            let [dp, dq, dr] = t.map(|v| Vector2::new(direction[2 * v as usize], direction[2 * v as usize + 1]));
-            let (e, f, de, df) = (q - p, r - p, dq - dp, dr - dp);
-            let (c, b, a) = (e.perp(&f), e.perp(&df) + de.perp(&f), de.perp(&df));
-            // Smallest positive root of a t² + b t + c, c > 0, in the form that does not cancel.
-            let discriminant = b * b - 4.0 * a * c;
-            if discriminant >= 0.0 {
-                let denominator = discriminant.sqrt() - b;
-                if denominator > 0.0 {
-                    least = least.min(2.0 * c / denominator);
-                }
-            }
-        }
-        least
     }
 }
 
@@ -277,7 +288,8 @@ mod tests {
         system.assemble(&energy, &bent);
         let gradient = system.gradient().to_vec();
         for k in 0..gradient.len() {
-            let df = system.value(&energy, &nudge(&bent, k, h)) - system.value(&energy, &nudge(&bent, k, -h));
+            let df =
+                system.faces.value(&energy, &nudge(&bent, k, h)) - system.faces.value(&energy, &nudge(&bent, k, -h));
             assert!((df / (2.0 * h) - gradient[k]).abs() < 1e-7, "{k}");
         }
         for k in 0..gradient.len() {
@@ -298,18 +310,18 @@ mod tests {
     fn the_first_flip_is_where_a_determinant_vanishes() {
         let mesh = hemisphere(6);
         let rest = RestTriangle::of_mesh(&mesh);
-        let system = ChartSystem::new(&mesh, &rest).expect("analysis");
+        let faces = ChartFaces::new(&mesh, &rest);
         let circle = crate::stretch::TutteBoundary::Circle;
         let uv = crate::stretch::tutte_embedding(&mesh, &rest, circle, &crate::progress::Progress::new());
         let uv = uv.expect("solver").expect("positive");
         for seed in 0..20_u32 {
             let direction: Vec<f64> =
                 (0..2 * uv.len() as u32).map(|k| f64::from((k * 7919 + seed * 104_729) % 1009) / 504.0 - 1.0).collect();
-            let limit = system.first_flip(&uv, &direction);
+            let limit = faces.first_flip(&uv, &direction);
             let least = |t: f64| {
                 let mut moved = uv.clone();
                 advance(&uv, &direction, t, &mut moved);
-                system.least_determinant(&moved)
+                faces.least_determinant(&moved)
             };
             assert!(limit.is_finite() && least(0.999 * limit) > 0.0 && least(1.001 * limit) < 0.0, "{limit}");
         }

@@ -25,8 +25,7 @@ pub(super) struct Contacts {
 
 /// Finds all contacts of edges, those of edges that follow each other aside.
 pub(super) fn contacts(edges: &[BoundaryEdge], progress: &Progress) -> Result<Contacts, Cancelled> {
-    let boxes: Vec<Bounds> = edges.iter().map(|e| Bounds::of(&e.ends.map(|p| p.map(f64::from)))).collect();
-    let tree = BoxTree::new(&boxes);
+    let tree = BoxTree::new(edges.iter().map(|e| Bounds::of(&e.ends.map(|p| p.map(f64::from)))).collect());
     let ordered: Vec<BoundaryEdge> = (0..tree.len()).map(|p| edges[tree.source(p)]).collect();
     let mut state = (Contacts { complete: true, ..Contacts::default() }, 0u64);
     let total_budget = 64 * edges.len() as u64 + 100_000_000;

@@ -36,12 +36,12 @@ pub(super) fn nested(boundary: &Boundary, progress: &Progress) -> Result<Nested,
         outlines.push(Outline {
             edges,
             bounds: boxes.iter().fold(Bounds::EMPTY, |a, b| a.union(b)),
-            tree: (edges.len() > LINEAR).then(|| BoxTree::new(&boxes)),
+            tree: (edges.len() > LINEAR).then(|| BoxTree::new(boxes)),
             lowest: edges.iter().map(|e| e.triangle).min().unwrap_or(0),
         });
     }
     progress.check()?;
-    let tree = BoxTree::new(&outlines.iter().map(|o| o.bounds).collect::<Vec<_>>());
+    let tree = BoxTree::new(outlines.iter().map(|o| o.bounds).collect());
     let mut out = Nested { nested: Defect::default(), charts: Vec::new(), complete: true };
     // Work done so far. Ten nanoseconds each: seconds at worst.
     let mut state = 0u64;

@@ -1,3 +1,5 @@
+use std::sync::Arc;
+
 use ble_unwrap_fixtures::{self as fixtures, PolyMesh};
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
@@ -17,7 +19,8 @@ fn conditioned(poly: &PolyMesh) -> TriMesh {
         corner_triangles: None,
         ..MeshInput::default()
     };
-    condition(&input, &ConditionOptions::default(), &Progress::new()).expect("a valid mesh").mesh
+    let surface = condition(&input, &ConditionOptions::default(), &Progress::new()).expect("a valid mesh");
+    Arc::unwrap_or_clone(surface.mesh)
 }
 
 fn run(mesh: &TriMesh, target: usize) -> Coarse {
