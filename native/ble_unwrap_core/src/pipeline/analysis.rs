@@ -15,7 +15,7 @@ use crate::settings::{ChartScale, LimitOver, Settings};
 use super::memo::{self, Fingerprint, Kind, Memo, Run};
 use super::rungs::Rungs;
 use super::tally::Tally;
-use super::{Atlas, Clock, budget, component, finish, on_a_worker, ribbons};
+use super::{Atlas, Clock, budget, component, finish, ribbons};
 
 /// A mesh and what was found out about it, for unwrapping it several times with different settings.
 ///
@@ -41,7 +41,7 @@ impl Analysis {
     pub fn new(input: &MeshInput<'_>, weld: bool, progress: &Progress) -> Result<Self, UnwrapError> {
         progress.check()?;
         progress.enter(Stage::Condition);
-        let prepared = on_a_worker(|| Prepared::new(input, weld, progress))?;
+        let prepared = Prepared::new(input, weld, progress)?;
         Ok(Self {
             memo: Memo::new(prepared.surface.mesh.face_count()),
             prepared,
@@ -83,7 +83,7 @@ impl Analysis {
             ..MeshInput::default()
         };
         self.memo.begin();
-        on_a_worker(|| self.prepared.unwrap(&input, settings, Clock::new(), &Run::new(progress, Some(&self.memo))))
+        self.prepared.unwrap(&input, settings, Clock::new(), &Run::new(progress, Some(&self.memo)))
     }
 }
 

@@ -291,7 +291,7 @@ mod tests {
             Chart { patch, uv, l2: 1.0 }
         };
         let halves = vec![half(1.0), half(-1.0)];
-        (cap.mesh, polygon, halves)
+        (TriMesh::clone(&cap.mesh), polygon, halves)
     }
 
     fn merged(family: [Option<u32>; 2], which: Which, settings: &Settings) -> (Vec<Chart>, Rungs) {

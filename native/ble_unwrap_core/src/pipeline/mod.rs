@@ -68,19 +68,11 @@ pub struct Atlas {
 pub fn unwrap(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -> Result<Atlas, UnwrapError> {
     progress.check()?;
     settings.validate()?;
-    on_a_worker(|| {
-        let mut clock = Clock::new();
-        progress.enter(Stage::Condition);
-        let prepared = Prepared::new(input, settings.weld, progress)?;
-        clock.lap("condition");
-        prepared.unwrap(input, settings, clock, &Run::new(progress, None))
-    })
-}
-
-/// Runs `work` on a thread of rayon's current pool, where its parallel parts run anyway: allocators keep memory that a
-/// thread has freed for that thread, so that stages which follow one another on one thread take less.
-fn on_a_worker<T: Send>(work: impl FnOnce() -> T + Send) -> T {
-    rayon::scope(|_| work())
+    let mut clock = Clock::new();
+    progress.enter(Stage::Condition);
+    let prepared = Prepared::new(input, settings.weld, progress)?;
+    clock.lap("condition");
+    prepared.unwrap(input, settings, clock, &Run::new(progress, None))
 }
 
 /// Seconds of each stage, for the report; nothing is decided by them.

@@ -270,12 +270,14 @@ fn on_face(chart: &Chart, f: FaceId, p: &Point3<f64>) -> (f64, Point2<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
+
     use crate::Progress;
     use crate::mesh::{self, test_surfaces};
 
     /// A mesh as a patch of itself, every triangle a polygon.
     fn whole(mesh: &TriMesh) -> Patch {
-        Patch::components(mesh, &(0..mesh.face_count() as u32).collect::<Vec<_>>()).remove(0)
+        Patch::whole(Arc::new(mesh.clone()), (0..mesh.face_count() as u32).collect())
     }
 
     fn nearest(mesh: &TriMesh, x: f64, y: f64) -> VertexId {
@@ -308,7 +310,8 @@ mod tests {
         let local: Vec<FaceId> = coarse.mesh.faces().collect();
         assert_eq!(coarse_cuts(&coarse, &chart, &local, |_| false).tips, [tip]);
         let part = whole(&fine);
-        let Prolonged { patch, start } = prolong(&coarse, &chart, &part, |_| false).expect("it lies on the chart");
+        let Prolonged { patch, start } =
+            prolong(&coarse, &chart, part.clone(), |_| false).expect("it lies on the chart");
         assert!(patch.mesh.topology().is_disk());
         let (twice, ends) = slit(&patch, coarse.source[tip.index()]);
         assert!(ends, "the cut ends where the dart does");
@@ -318,7 +321,7 @@ mod tests {
         }
 
         // Where the part is cut already nothing is left to do.
-        let Prolonged { patch, .. } = prolong(&coarse, &chart, &part.cut(&[]), |_| true).expect("as before");
+        let Prolonged { patch, .. } = prolong(&coarse, &chart, part.cut(&[]), |_| true).expect("as before");
         assert_eq!(slit(&patch, coarse.source[tip.index()]), (0, false));
     }
 

@@ -89,12 +89,14 @@ impl<'a> Relief<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
+
     use crate::mesh::{TriMesh, measure, test_surfaces};
     use nalgebra::Point3;
 
     fn whole(mesh: TriMesh) -> Patch {
         let polygon = (0..mesh.face_count() as u32).collect();
-        Patch { faces: mesh.faces().collect(), vertices: mesh.vertices().collect(), polygon, mesh }
+        Patch::whole(Arc::new(mesh), polygon)
     }
 
     /// A mesh with its vertices moved.
