@@ -30,16 +30,16 @@ static ROWS: [Row; 17] = [
     row("annulus", [1, 1], 1.000_001, 0.0, 0.61),
     row("cap of 40 degrees", [1, 1], 1.02, 0.0, 0.70),
     row("hemisphere", [1, 1], 1.03, 0.0, 0.73),
-    row("icosphere", [1, 1], 1.03, 1.80, 0.53),
+    row("icosphere", [1, 1], 1.07, 0.93, 0.60),
     row("open cylinder", [1, 1], 1.000_001, 0.76, 0.43),
     row("capped cylinder", [1, 1], 1.06, 1.90, 0.49),
-    row("cone", [1, 1], 1.01, 0.72, 0.55),
+    row("cone", [1, 1], 1.000_001, 0.85, 0.54),
     row("torus", [1, 1], 1.04, 1.89, 0.39),
     row("plate with five holes", [1, 1], 1.06, 4.10, 0.30),
     row("Moebius strip", [2, 2], 1.001, 0.64, 0.52),
     row("Klein bottle", [1, 1], 1.04, 1.90, 0.55),
     row("face", [1, 1], 1.04, 0.0, 0.73),
-    row("small sculpt", [2, 8], 1.1, 5.8, 0.6),
+    row("small sculpt", [1, 3], 1.1, 4.5, 0.38),
 ];
 
 #[test]

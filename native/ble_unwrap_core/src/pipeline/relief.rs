@@ -48,9 +48,12 @@ impl<'a> Relief<'a> {
         self.bulge.root.is_none() && self.bulge.l2 <= self.most
     }
 
-    /// The patch with as many darts as make it promising; `None` where that takes none, too many, or nothing bulges.
+    /// The patch with as many darts as make it promising; `None` where that takes none, too many, or nothing bulges. Also where
+    /// guides run inside it: they say where it is to be cut, and a split goes there.
     pub(super) fn relieved(self) -> Option<Patch> {
-        if self.is_promising() {
+        let mesh = &self.patch.mesh;
+        let is_guided = mesh.has_guides() && mesh.edges().any(|h| mesh.is_guide(h) && !mesh.is_boundary(h));
+        if is_guided || self.is_promising() {
             return None;
         }
         let mut relief = self;
