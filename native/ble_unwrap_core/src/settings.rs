@@ -15,7 +15,7 @@ const PAPER_TOGETHER_MAX: usize = 2_000;
 /// Most vertices of a patch whose distances to each other can be handled: 8 GB and minutes.
 pub(crate) const MOST_TOGETHER: usize = 20_000;
 
-/// The value of [`Settings::least_sewn`] that keeps charts from being sewn.
+/// The value of [`Settings::least_sewn`] that keeps charts without darts.
 pub const NEVER_SEWN: f64 = 1e3;
 
 /// What happens to the holes of a chart.
@@ -67,7 +67,8 @@ pub struct Settings {
     pub merge: bool,
     /// Charts whose union would be over the limit are sewn along a part of their border, the rest being left as a dart,
     /// where that part is at least this share of the square root of the smaller one's area: less for fewer charts and a
-    /// shorter seam, more for compact charts. From [`NEVER_SEWN`] on none are.
+    /// shorter seam, more for compact charts. From [`NEVER_SEWN`] on none are, nor are patches cut by darts before they are
+    /// split.
     pub least_sewn: f64,
     /// Holes of charts.
     pub holes: Holes,

@@ -134,7 +134,8 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 ///     Whether charts are joined again where their union stays under the limit.
 /// least_sewn : float, 0 to 1000
 ///     Charts are sewn along a part of their border, the rest left as a dart, where that is at least this share of the
-///     square root of the smaller one's area. Less for fewer charts, more for compact ones, 1000 for no darts.
+///     square root of the smaller one's area. Less for fewer charts, more for compact ones, 1000 for no darts
+///     of any kind.
 /// holes : {"keep", "cut"}
 ///     Whether charts may have holes or are cut to disks.
 /// chart_scale : {"uniform", "stretch"}

@@ -1,6 +1,6 @@
 //! Darts before splits: a patch that bulges is cut from where it does to its boundary.
 //!
-//! One linear system tells what a map of the patch would be stretched by, and where ([`stretch::bulge`]). So darts are
+//! One linear system tells what a map of the patch would be stretched by, and where ([`stretch::bulge()`]). So darts are
 //! placed one after the other before anything is flattened, until the patch promises to stay under the limit: at the
 //! tips of fingers, the corners of boxes, the ends of a closed body.
 

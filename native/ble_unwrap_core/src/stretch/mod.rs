@@ -9,7 +9,7 @@
 //! if no face is flipped and the boundary loops are simple ([`boundary_is_simple`]).
 //!
 //! The ways in: [`make_injective`] removes flips, [`minimise_stretch`] lowers the stretch without making
-//! any, [`bulge`] tells where to cut before all that, [`tutte_embedding`] makes an injective map from nothing, [`first_flip`] and [`boundary_is_simple`] check exactly.
+//! any, [`bulge()`] tells where to cut before all that, [`tutte_embedding`] makes an injective map from nothing, [`first_flip`] and [`boundary_is_simple`] check exactly.
 //!
 //! Papers: Sander et al. 2001 (stretch, line searches), Smith and Schaefer 2015 (step limits, boundary
 //! barrier), Smith et al. 2019 (closed-form Hessians), Garanzha et al. 2021 (flips), Tutte 1963 and Floater
