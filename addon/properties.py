@@ -205,7 +205,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         name="Least Sewn",
         description=(
             "Charts are sewn along a part of their border, the rest left open, if that part is this long beside the "
-            "width of the smaller one. Less gives fewer charts, more gives compact ones, 1000 sews none and cuts no darts"
+            "width of the smaller one. Less gives fewer charts, more gives compact ones, 1000 makes no darts"
         ),
         default=0.2,
         min=0.0,
