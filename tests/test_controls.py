@@ -85,7 +85,7 @@ def test_crease_weight_draws_borders_to_creases():
     assert len(rims) == 96
     on_rim = {}
     for weight in (0, 1, 2):
-        atlas = unwrap(*mesh, crease_weight=weight, stretch_limit=1.02, merge=False)
+        atlas = unwrap(*mesh, crease_weight=weight, stretch_limit=1.02, merge=False, least_sewn=1000)
         on_rim[weight] = len(borders(mesh, arrays(atlas)[1]) & rims)
     assert on_rim[0] < 10 and min(on_rim[1], on_rim[2]) > 30, on_rim
 
@@ -100,13 +100,13 @@ def test_crease_weight_out_of_range(square, value):
 
 
 def test_a_limit_over_the_atlas(blob):
-    charts = unwrap(*blob, stretch_limit=1.02).report
-    atlas = unwrap(*blob, stretch_limit=1.02, limit_over="atlas").report
-    assert charts["chart_limit"] == 1.02 and charts["atlas_limit"] is None
-    assert atlas["chart_limit"] == pytest.approx(1.08) and atlas["atlas_limit"] == 1.02
+    charts = unwrap(*blob, stretch_limit=1.015).report
+    atlas = unwrap(*blob, stretch_limit=1.015, limit_over="atlas").report
+    assert charts["chart_limit"] == 1.015 and charts["atlas_limit"] is None
+    assert atlas["chart_limit"] == pytest.approx(1.06) and atlas["atlas_limit"] == 1.015
     assert atlas["charts"] < charts["charts"] and atlas["seam_length"] < charts["seam_length"]
-    assert 1.02 < atlas["l2_worst_chart"] <= 1.08, "single charts have more than the limit"
-    assert charts["l2"] < atlas["l2"] <= 1.02
+    assert 1.015 < atlas["l2_worst_chart"] <= 1.06, "single charts have more than the limit"
+    assert charts["l2"] < atlas["l2"] <= 1.015
     assert atlas["charts_over_limit"] == [] and atlas["warnings"] == []
     assert atlas["flips"] == atlas["overlaps"] == 0
     with pytest.raises(native.InvalidArgumentError, match="limit_over: expected 'chart' or 'atlas'; found 'mesh'"):

@@ -12,7 +12,10 @@ const UNIT: f64 = 65536.0;
 /// Sides much longer than their polygons are apart, as between needles, count as this wide.
 const WIDEST: f64 = 100.0;
 
-/// 1 − cos(dihedral) of each side, in the order of the graph's links.
+/// A valley counts as a bend so many times as sharp as the same ridge: there a seam is hidden, on a ridge it shows.
+const VALLEY: f64 = 2.0;
+
+/// 1 − cos(dihedral) of each side, more where it is a valley, in the order of the graph's links.
 pub(super) struct Bends {
     first: Vec<usize>,
     bend: Vec<f64>,
@@ -38,6 +41,9 @@ impl Bends {
             for link in links {
                 let (f, g) = (link.halfedge.face(), mesh.twin(link.halfedge).face());
                 let d = (1.0 - normals[f.index()].dot(&normals[g.index()])).clamp(0.0, 2.0);
+                let apex = mesh.position(mesh.from(mesh.twin(link.halfedge).prev()));
+                let rises = normals[f.index()].dot(&(apex - mesh.position(mesh.from(link.halfedge))));
+                let d = if rises > 0.0 { VALLEY * d } else { d };
                 sum_bend += d * link.length;
                 sum_length += link.length;
                 bend.push(d);
@@ -91,4 +97,36 @@ fn middle(mesh: &TriMesh, faces: &[FaceId]) -> Point3<f64> {
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the range of capacities")]
 pub(super) fn capacity(relative: f64) -> u64 {
     (relative * UNIT).clamp(1.0, 1e12) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::test_surfaces;
+
+    #[test]
+    fn a_valley_is_cheaper_to_cut_than_the_same_ridge_and_a_plane_dearest() {
+        // Flat, up, flat: a valley at x = 1 and a ridge at x = 2.
+        let heights = [0.0, 0.0, 1.0, 1.0];
+        let positions: Vec<Point3<f64>> =
+            (0..8).map(|i| Point3::new(f64::from(i / 2), f64::from(i % 2), heights[i as usize / 2])).collect();
+        let triangles: Vec<[u32; 3]> =
+            (0..3).flat_map(|k| [[2 * k, 2 * k + 2, 2 * k + 3], [2 * k, 2 * k + 3, 2 * k + 1]]).collect();
+        let mesh = test_surfaces::mesh(&positions, &triangles);
+        let polygon: Vec<u32> = (0..6).collect();
+        let graph = PolygonGraph::new(&mesh, &polygon);
+        let bends = Bends::new(&mesh, &graph, 1.0);
+        let cost = |x: f64, y: f64| {
+            let middle = |h| 0.5 * (mesh.position(mesh.from(h)).coords + mesh.position(mesh.to(h)).coords);
+            let mut sides = (0..graph.len()).flat_map(|p| (0..graph.links.group(p).len()).map(move |k| (p, k)));
+            let (p, k) = sides
+                .find(|&(p, k)| {
+                    (middle(graph.links.group(p)[k].halfedge).xy() - nalgebra::Vector2::new(x, y)).norm() < 1e-9
+                })
+                .expect("a side");
+            bends.crease(p, k)
+        };
+        let (valley, ridge, flat) = (cost(1.0, 0.5), cost(2.0, 0.5), cost(0.5, 0.5));
+        assert!(valley < 0.8 * ridge && ridge < 0.8 * flat && flat == 1.0, "{valley} {ridge} {flat}");
+    }
 }
