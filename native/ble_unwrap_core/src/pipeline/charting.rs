@@ -241,6 +241,9 @@ impl<'a> Attempt<'a> {
                 return Ok(Some(flat.into_chart(patch.clone())));
             }
             let relief = self.relief(patch);
+            if let Some(chart) = net(relief.as_ref(), rungs) {
+                return Ok(Some(chart));
+            }
             let flattened = match flatten::projected(patch, self.settings, rungs, self.progress)? {
                 Some(verdict) => verdict,
                 None if relief.as_ref().is_some_and(|r| !r.is_promising()) => Flattened::Refused,
@@ -261,7 +264,11 @@ impl<'a> Attempt<'a> {
         // A few faces are not worth a cut.
         let blob = self.topology.loops == 0 && self.topology.genus() == 0;
         if blob {
-            return self.relieved(self.relief(patch), rungs);
+            let relief = self.relief(patch);
+            return match net(relief.as_ref(), rungs) {
+                Some(chart) => Ok(Some(chart)),
+                None => self.relieved(relief, rungs),
+            };
         }
         if self.topology.is_disk() || patch.faces.len() < LEAST_FACES_TO_CUT {
             return Ok(None);
@@ -361,6 +368,14 @@ impl<'a> Attempt<'a> {
         }
         flatten::flatten(patch, distances, self.settings, rungs, self.progress)
     }
+}
+
+/// A box or the like, unfolded.
+fn net(relief: Option<&Relief<'_>>, rungs: &mut Rungs) -> Option<Chart> {
+    let net = relief?.net()?;
+    let flat = flatten::isometric(&net, rungs)?;
+    rungs.take(Rung::Dart);
+    Some(flat.into_chart(net))
 }
 
 fn analyse(

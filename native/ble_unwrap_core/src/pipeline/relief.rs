@@ -10,7 +10,7 @@ use nalgebra::Point2;
 
 use crate::charts::{self, Patch};
 use crate::distortion::RestTriangle;
-use crate::mesh::HalfedgeId;
+use crate::mesh::{HalfedgeId, VertexId};
 use crate::stretch::{self, Bulge};
 
 /// A patch is promising if its conformal map has at most so many times the stretch above 1 that the limit allows; the map of
@@ -19,6 +19,8 @@ use crate::stretch::{self, Bulge};
 const PROMISING: f64 = 6.0;
 /// A patch that needs more darts is split.
 const MOST_DARTS: usize = 6;
+/// A patch with more corners has no net: a box has eight.
+const MOST_CORNERS: usize = 8;
 
 /// A patch, how it bulges, and how much it may.
 #[derive(Clone)]
@@ -66,6 +68,23 @@ impl<'a> Relief<'a> {
         None
     }
 
+    /// A patch that is flat but for a few corners, cut to all of these: a net, which unfolds without stretch. `None` where it
+    /// has none, too many, or curvature elsewhere.
+    pub(super) fn net(&self) -> Option<Patch> {
+        let mut net = Cow::Borrowed(&*self.patch);
+        let mut root = self.bulge.root;
+        for _ in 0..=MOST_CORNERS {
+            let corners = stretch::corners(&net.mesh, MOST_CORNERS)?;
+            let mut tips = corners.into_iter().filter(|v| Some(*v) != root).peekable();
+            if tips.peek().is_none() {
+                return if let Cow::Owned(net) = net { Some(net) } else { None };
+            }
+            net = Cow::Owned(tips.find_map(|tip| cut_to(&net, tip, root))?);
+            root = None;
+        }
+        None
+    }
+
     /// The patch with one dart, and where its vertices are if they stay where they were.
     pub(super) fn opened(&self, uv: &[Point2<f64>]) -> Option<(Patch, Vec<Point2<f64>>)> {
         let open = self.with_dart()?;
@@ -79,14 +98,18 @@ impl<'a> Relief<'a> {
 
     /// The patch cut from its tip to the boundary, or on a closed surface to its root.
     fn with_dart(&self) -> Option<Patch> {
-        let (patch, mesh) = (&self.patch, &self.patch.mesh);
-        let length = |h: HalfedgeId| mesh.edge_length(h) * mesh.border_cost(h);
-        let is_diagonal = |h: HalfedgeId| patch.is_diagonal(h);
-        let dart = charts::shortest_path_to_boundary(mesh, self.bulge.tip?, self.bulge.root, length, is_diagonal)?;
-        // One edge of a closed surface, cut, opens nothing.
-        let least = if self.bulge.root.is_some() { 2 } else { 1 };
-        (dart.len() >= least).then(|| patch.cut(&dart))
+        cut_to(&self.patch, self.bulge.tip?, self.bulge.root)
     }
+}
+
+/// A patch cut from an inner vertex to the boundary, or on a closed surface to its root.
+fn cut_to(patch: &Patch, tip: VertexId, root: Option<VertexId>) -> Option<Patch> {
+    let mesh = &patch.mesh;
+    let length = |h: HalfedgeId| mesh.edge_length(h) * mesh.border_cost(h);
+    let dart = charts::shortest_path_to_boundary(mesh, tip, root, length, |h| patch.is_diagonal(h))?;
+    // One edge of a closed surface, cut, opens nothing.
+    let least = if root.is_some() { 2 } else { 1 };
+    (dart.len() >= least).then(|| patch.cut(&dart))
 }
 
 #[cfg(test)]
@@ -138,6 +161,20 @@ mod tests {
         assert!(flat.is_promising() && flat.relieved().is_none());
         let ball = whole(test_surfaces::sphere(3));
         assert!(Relief::of(&ball, 1.001).expect("a bulge").relieved().is_none(), "no six darts do for that limit");
+    }
+
+    #[test]
+    fn a_box_has_a_net_whole_or_open_and_a_ball_has_none() {
+        let cube = test_surfaces::cubes([1, 1, 1], |_| true);
+        let box_of = |mesh| whole(moved(mesh, |p| Point3::new(p.x, 2.0 * p.y, 3.0 * p.z)));
+        let closed = box_of(&cube);
+        let net = Relief::of(&closed, 1.1).and_then(|r| r.net()).expect("a net");
+        assert!(net.mesh.topology().is_disk());
+        assert_eq!(stretch::corners(&net.mesh, 0), Some(Vec::new()), "no corner is left inside");
+        let ball = whole(test_surfaces::sphere(3));
+        assert!(Relief::of(&ball, 1.1).expect("factored").net().is_none());
+        let sheet = whole(test_surfaces::grid(4, 4, [1.0, 1.0], 0.0));
+        assert!(Relief::of(&sheet, 1.1).expect("factored").net().is_none(), "nothing to cut");
     }
 
     #[test]

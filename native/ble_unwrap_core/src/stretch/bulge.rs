@@ -16,6 +16,11 @@ const WEIGHTS: (f64, f64) = (0.05, 20.0);
 /// Peaks below this (in u: two parts in a hundred of length) are no bulge.
 const LEAST_PEAK: f64 = 0.02;
 
+/// A vertex of less angle defect is flat: half a degree, as where a piece is unfolded.
+const FLAT_DEFECT: f64 = 0.008_726_6;
+/// One of more is a corner: 30°, a third of a box's.
+const SHARP_DEFECT: f64 = 0.523_6;
+
 /// How a surface bulges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bulge {
@@ -78,6 +83,18 @@ pub fn bulge(mesh: &TriMesh, rest: &[RestTriangle]) -> Result<Bulge, SparseError
         }
     }
     Ok(Bulge { l2: (grown * shrunk).sqrt() / surface, tip: peak.filter(|v| u[v.index()] > LEAST_PEAK), root })
+}
+
+/// The inner vertices of a surface that is flat everywhere else, as of a box, sharpest first; `None` where it is curved at
+/// more than so many of them, or bent inwards. O(n).
+#[must_use]
+pub fn corners(mesh: &TriMesh, most: usize) -> Option<Vec<VertexId>> {
+    let defect = angle_defects(mesh);
+    let curved = |v: &VertexId| !mesh.is_boundary_vertex(*v) && defect[v.index()].abs() > FLAT_DEFECT;
+    let mut corners: Vec<VertexId> = mesh.vertices().filter(curved).take(most + 1).collect();
+    corners.sort_by(|a, b| defect[b.index()].total_cmp(&defect[a.index()]).then_with(|| a.cmp(b)));
+    let all_sharp = corners.iter().all(|v| defect[v.index()] > SHARP_DEFECT);
+    (corners.len() <= most && all_sharp).then_some(corners)
 }
 
 /// 2π less the angles around each vertex.

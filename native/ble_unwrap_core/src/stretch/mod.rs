@@ -38,7 +38,7 @@ use nalgebra::Point2;
 use thiserror::Error;
 
 pub use barrier::{BOUNDARY_REACH, boundary_is_tight};
-pub use bulge::{Bulge, bulge};
+pub use bulge::{Bulge, bulge, corners};
 pub use injective::{Injective, InjectiveMap, clear_flips, clear_locally, make_injective};
 pub use measure::{
     l2_of_positions, l2_stretch, l2_unsigned, linf_stretch, plane_area, rescale_to_equal_area, surface_area,
