@@ -5,7 +5,7 @@
 //! gives it room: so M. Ben-Chen, C. Gotsman, G. Bunin place their cones (Conformal flattening by curvature prescription and
 //! metric scaling, Eurographics 2008). And the spread of u tells the stretch of that map, which is little more than the least.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_6, TAU};
 
 use crate::distortion::RestTriangle;
 use crate::linalg::{SparseCholesky, SparseError, SparsePattern};
@@ -19,7 +19,7 @@ const LEAST_PEAK: f64 = 0.02;
 /// A vertex of less angle defect is flat: half a degree, as where a piece is unfolded.
 const FLAT_DEFECT: f64 = 0.008_726_6;
 /// One of more is a corner: 30°, a third of a box's.
-const SHARP_DEFECT: f64 = 0.523_6;
+const SHARP_DEFECT: f64 = FRAC_PI_6;
 
 /// How a surface bulges.
 #[derive(Clone, Copy, Debug, PartialEq)]
