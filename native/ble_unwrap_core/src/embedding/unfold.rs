@@ -6,14 +6,12 @@ use std::collections::BinaryHeap;
 use nalgebra::{Matrix2, Point2, Vector2, Vector3};
 
 use crate::distortion::{RestTriangle, signed_double_area, singular_values};
-use crate::mesh::measure::{area_vector, corner_angle};
+use crate::mesh::measure::{FLAT_DEFECT, angle_defects, area_vector};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 
 /// Most that a normal may lean from the mean one: 0.5°, the angle defect that counts as flat. A face projected
 /// at that slope is shortened by 4e-5.
 const COPLANAR_COS: f64 = 0.999_961_9;
-/// Largest angle defect of an interior vertex of a developable piece, in radians: 0.5°.
-const LARGEST_DEFECT: f64 = 0.008_726_6;
 /// An unfolding is accepted if the singular values of every face lie this near to 1. Then its L2 stretch is below
 /// 1.006. Small defects add up along the way: this, not the defect, is the decisive test.
 const LARGEST_STRAIN: f64 = 5e-3;
@@ -94,17 +92,11 @@ pub fn unfold(mesh: &TriMesh, rest: &[RestTriangle]) -> Option<Vec<Point2<f64>>>
     (accurate || pair).then_some(uv)
 }
 
-/// Whether there is a boundary and no interior angle defect exceeds [`LARGEST_DEFECT`].
+/// Whether there is a boundary and no interior angle defect exceeds [`FLAT_DEFECT`].
 fn is_developable(mesh: &TriMesh) -> bool {
-    let mut angle = vec![0.0; mesh.vertex_count()];
-    let mut open = false;
-    for h in mesh.halfedges() {
-        let [a, b, c] = [h, h.next(), h.prev()].map(|h| mesh.position(mesh.from(h)));
-        angle[mesh.from(h).index()] += corner_angle([a, b, c]);
-        open |= mesh.is_boundary(h);
-    }
-    let flat = |v: VertexId| (angle[v.index()] - std::f64::consts::TAU).abs() <= LARGEST_DEFECT;
-    open && mesh.vertices().all(|v| mesh.is_boundary_vertex(v) || flat(v))
+    let defect = angle_defects(mesh);
+    let is_flat = |v: VertexId| defect[v.index()].abs() <= FLAT_DEFECT;
+    mesh.halfedges().any(|h| mesh.is_boundary(h)) && mesh.vertices().all(|v| mesh.is_boundary_vertex(v) || is_flat(v))
 }
 
 /// A non-negative cost that sorts by value.

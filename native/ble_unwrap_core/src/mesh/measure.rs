@@ -1,8 +1,13 @@
 //! Lengths, areas and angles of triangles: free functions on points.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Point3, Vector3};
 
 use super::{FaceId, TriMesh};
+
+/// Angle defect, in radians, up to which the surface counts as flat at an inner vertex: half a degree.
+pub const FLAT_DEFECT: f64 = 0.008_726_6;
 
 /// Twice the area times the unit normal of a triangle.
 #[inline]
@@ -49,4 +54,15 @@ pub fn total_area(mesh: &TriMesh) -> f64 {
 #[must_use]
 pub fn face_normals(mesh: &TriMesh) -> Vec<Vector3<f64>> {
     mesh.faces().map(|f: FaceId| triangle_normal(mesh.triangle_positions(f))).collect()
+}
+
+/// 2π less the angles around each vertex, in radians: the curvature there, where it is inside.
+#[must_use]
+pub fn angle_defects(mesh: &TriMesh) -> Vec<f64> {
+    let mut defect = vec![TAU; mesh.vertex_count()];
+    for h in mesh.halfedges() {
+        let corner = [h, h.next(), h.prev()].map(|h| mesh.position(mesh.from(h)));
+        defect[mesh.from(h).index()] -= corner_angle(corner);
+    }
+    defect
 }

@@ -72,7 +72,7 @@ impl Effort {
         // A few charts have few orders and many poses, and an attempt costs next to nothing.
         let attempts = |all: usize, least, most| (all / charts.max(1)).clamp(least, most);
         match quality {
-            Quality::Fast => vec![Self { attempts: attempts(800, 40, 80), sketches: 6, ..grid }],
+            Quality::Fast => vec![Self { attempts: attempts(600, 30, 60), sketches: 3, ..grid }],
             Quality::High => {
                 let (attempts, sketches) = (attempts(20_000, 80, 400), 16);
                 let finer = Self { across: 50.0, least: 384.0, most: 2048.0, attempts, sketches };

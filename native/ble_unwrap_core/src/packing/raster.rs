@@ -39,7 +39,7 @@ pub(super) fn rasterise(outline: &Outline, turn: [f64; 2], scale: f64, inflation
         p.x += shift[0];
         p.y += shift[1];
     }
-    let mut crossings: Vec<(u32, f64, i32)> = Vec::new();
+    let mut crossings: Vec<Crossing> = Vec::new();
     for edge in &outline.edges {
         let (p, q) = (at[edge.from as usize], at[edge.to as usize]);
         cover_segment(&mut mask, p, q, inflation);
@@ -47,7 +47,7 @@ pub(super) fn rasterise(outline: &Outline, turn: [f64; 2], scale: f64, inflation
             cross_rows(p, q, edge.winding, mask.height(), &mut crossings);
         }
     }
-    fill(&mut mask, &mut crossings);
+    fill(&mut mask, &crossings);
     if mask.is_empty() {
         let (x, y) = (mask.width() / 2, mask.height() / 2);
         mask.set_run(y, x, x);
@@ -80,9 +80,18 @@ fn cover_segment(mask: &mut Mask, p: Point2<f64>, q: Point2<f64>, e: f64) {
     }
 }
 
+/// Where an edge crosses the middle line of a row.
+#[derive(Clone, Copy, Default)]
+struct Crossing {
+    row: u32,
+    /// Change of the winding number there.
+    winding: i32,
+    x: f64,
+}
+
 /// Collects where an edge crosses the middle lines of rows. Half-open in y, by comparing the end
 /// points themselves: crossings of a closed chain balance exactly in every row.
-fn cross_rows(p: Point2<f64>, q: Point2<f64>, winding: i32, height: usize, out: &mut Vec<(u32, f64, i32)>) {
+fn cross_rows(p: Point2<f64>, q: Point2<f64>, winding: i32, height: usize, out: &mut Vec<Crossing>) {
     let (low, high, sign) = if p.y < q.y { (p, q, -winding) } else { (q, p, winding) };
     let middle = |row: f64| row + 0.5;
     let mut row = (low.y - 0.5).floor().max(0.0);
@@ -91,25 +100,41 @@ fn cross_rows(p: Point2<f64>, q: Point2<f64>, winding: i32, height: usize, out: 
     }
     while middle(row) < high.y && row < height as f64 {
         let t = (middle(row) - low.y) / (high.y - low.y);
-        out.push((row as u32, low.x + t * (high.x - low.x), sign));
+        out.push(Crossing { row: row as u32, winding: sign, x: low.x + t * (high.x - low.x) });
         row += 1.0;
     }
 }
 
 /// Sets the cells whose centre has a winding number other than zero. A cell no edge touches lies
 /// wholly inside or wholly outside, so its centre decides.
-fn fill(mask: &mut Mask, crossings: &mut [(u32, f64, i32)]) {
-    crossings.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
-    for row in crossings.chunk_by(|a, b| a.0 == b.0) {
+fn fill(mask: &mut Mask, crossings: &[Crossing]) {
+    for row in by_row(crossings, mask.height()).chunk_by_mut(|a, b| a.row == b.row) {
+        // A row has few.
+        row.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.winding.cmp(&b.winding)));
         let mut winding = 0;
         for pair in row.windows(2) {
-            winding += pair[0].2;
-            let (from, to) = ((pair[0].1 - 0.5).ceil().max(0.0), (pair[1].1 - 0.5).floor());
+            winding += pair[0].winding;
+            let (from, to) = ((pair[0].x - 0.5).ceil().max(0.0), (pair[1].x - 0.5).floor());
             if winding != 0 && from <= to {
-                mask.set_run(row[0].0 as usize, from as usize, to as usize);
+                mask.set_run(pair[0].row as usize, from as usize, to as usize);
             }
         }
     }
+}
+
+/// The crossings row by row: a sort by counting.
+fn by_row(crossings: &[Crossing], rows: usize) -> Vec<Crossing> {
+    let mut next = vec![0; rows + 1];
+    crossings.iter().for_each(|c| next[c.row as usize + 1] += 1);
+    for row in 0..rows {
+        next[row + 1] += next[row];
+    }
+    let mut sorted = vec![Crossing::default(); crossings.len()];
+    for c in crossings {
+        sorted[next[c.row as usize]] = *c;
+        next[c.row as usize] += 1;
+    }
+    sorted
 }
 
 #[cfg(test)]

@@ -101,8 +101,9 @@ impl Shape {
                     to_cells = to_cells.quarter_turn(mask.height() as f64);
                     mask = mask.quarter_turn();
                 }
-                if !footprints.iter().any(|f| f.key == mask.key() && f.mask == mask) {
-                    footprints.push(Footprint::new(mask.clone(), squares.clone(), to_cells));
+                let footprint = Footprint::new(mask.clone(), squares.clone(), to_cells);
+                if !footprints.iter().any(|f| f.key == footprint.key && f.mask == footprint.mask) {
+                    footprints.push(footprint);
                 }
                 if tiny || !quarters {
                     break;

@@ -14,15 +14,16 @@ use crate::charts::{Chart, Patch};
 use crate::mesh::{self, Coarse, FaceId, Groups, HalfedgeId, TriMesh};
 use crate::progress::Cancelled;
 use crate::segmentation::{self, Segmentation};
-use crate::settings::Settings;
+use crate::settings::{NEVER_SEWN, Settings};
 
 use super::carry::carried_over;
 use super::charting::{self, Charting};
 use super::darts::{self, Sewn};
-use super::flatten::{self, Polished};
+use super::flatten::{self, Polished, Positions};
 use super::memo::{self, Fingerprint, Kind, Run};
 use super::merge::{self, Which};
 use super::prolong::{Prolonged, prolong};
+use super::relief;
 use super::rungs::{Rung, Rungs};
 use super::tally::Tally;
 
@@ -331,7 +332,16 @@ impl<'a> OnCoarse<'a> {
         accepted.extend(charting.charts.into_iter().zip(family));
         accepted.sort_by_key(|(c, _)| c.patch.faces[0]);
         let (charts, family) = accepted.into_iter().unzip();
-        Ok(Charting { charts, family, rungs: charting.rungs })
+        Ok(Charting { charts, family, rungs: charting.rungs, refused: charting.refused })
+    }
+
+    /// What detail asks for: the collapse leaves no doubled edges.
+    fn opened(&self, patch: Patch, start: Positions) -> (Patch, Positions) {
+        if self.settings.least_sewn < NEVER_SEWN {
+            relief::without_doubled_edges(patch, start)
+        } else {
+            (patch, start)
+        }
     }
 
     fn step(&self, part: &Part, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Outcome, Cancelled> {
@@ -339,6 +349,7 @@ impl<'a> OnCoarse<'a> {
         let done = |h: HalfedgeId| part.is_border(&self.coarse.mesh, h);
         let on_fine = || self.fine.part(&part.faces, &part.cuts);
         if let Some(Prolonged { patch, start }) = prolong(&self.coarse, &part.guide, on_fine(), done)
+            && let (patch, start) = self.opened(patch, start)
             && let Polished::Flat(flat) =
                 flatten::polish(&patch, &start, Rung::Prolonged, self.settings, rungs, progress)?
         {

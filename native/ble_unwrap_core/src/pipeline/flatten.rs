@@ -334,6 +334,14 @@ impl<'a> Trial<'a> {
                 }
                 Free::Overlaps => {}
             }
+            if limit.is_some() && !stretch::boundary_is_tangled(self.steps.mesh, &uv) {
+                if let Some(uv) = self.recall_start(Kind::Parted, &uv, || self.steps.part_boundary(&uv))? {
+                    let flat = self.apart(&uv, limit)?;
+                    if true {
+                        return Ok(flat.map_or(Flattened::Refused, Flattened::Flat));
+                    }
+                }
+            }
         }
         Ok(self.flatten_apart(limit, rungs)?.map_or(Flattened::Refused, Flattened::Flat))
     }

@@ -29,6 +29,8 @@ pub(super) enum Kind {
     Coarse,
     /// Distances on a patch and their spectral analysis.
     Analysis,
+    /// How a patch bulges.
+    Bulge,
     /// The labels of a patch's parts.
     Segments,
     /// Labels with their borders redrawn.
@@ -50,7 +52,7 @@ pub(super) enum Kind {
 pub(super) struct Fingerprint([u64; 2]);
 
 impl Fingerprint {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self([0x243f_6a88_85a3_08d3, 0x1319_8a2e_0370_7344])
     }
 

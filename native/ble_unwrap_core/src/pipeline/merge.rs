@@ -11,7 +11,7 @@ use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::progress::Cancelled;
 use crate::settings::Settings;
 
-use super::charting::{self, Charting};
+use super::charting::{self, Charting, Refused};
 use super::memo::Run;
 use super::rungs::{Rung, Rungs};
 use super::sew::{self, Joined};
@@ -86,6 +86,7 @@ pub(super) fn merge(
     progress: &Run<'_>,
 ) -> Result<(Vec<Chart>, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
+    let refused = charting.refused;
     let family = charting.family;
     let mut pool: Vec<Option<Candidate>> = charting
         .charts
@@ -130,7 +131,7 @@ pub(super) fn merge(
                 let sides = [&one.chart, &other.chart];
                 let joined = match start {
                     Start::Sewn => sew::joined(mesh, polygon, sides, settings, &mut rungs, progress)?,
-                    Start::Embedded => embedded(mesh, polygon, sides, settings, &mut rungs, progress)?,
+                    Start::Embedded => embedded(mesh, polygon, sides, &refused, settings, &mut rungs, progress)?,
                 };
                 Ok((joined, rungs))
             })
@@ -175,12 +176,17 @@ fn embedded(
     mesh: &TriMesh,
     polygon: &[u32],
     sides: [&Chart; 2],
+    refused: &Refused,
     settings: &Settings,
     rungs: &mut Rungs,
     progress: &Run<'_>,
 ) -> Result<Joined, Cancelled> {
     let mut faces: Vec<FaceId> = sides.iter().flat_map(|c| c.patch.faces.iter().copied()).collect();
     faces.sort_unstable();
+    // What was split into more than two may have come together again.
+    if refused.contains(&faces) {
+        return Ok(Joined::Refused);
+    }
     let patch = Patch::of_surface(mesh, polygon, faces);
     let chart = charting::as_one(&patch, settings, rungs, progress)?;
     // Darts may have made more seam than the border was.
@@ -296,7 +302,7 @@ mod tests {
 
     fn merged(family: [Option<u32>; 2], which: Which, settings: &Settings) -> (Vec<Chart>, Rungs) {
         let (mesh, polygon, charts) = halves_that_do_not_fit();
-        let charting = Charting { charts, family: family.to_vec(), rungs: Rungs::default() };
+        let charting = Charting { charts, family: family.to_vec(), rungs: Rungs::default(), refused: Refused::default() };
         let progress = Progress::new();
         merge(&mesh, &polygon, charting, which, settings, &Run::new(&progress, None)).expect("not cancelled")
     }

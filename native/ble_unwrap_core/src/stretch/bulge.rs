@@ -3,22 +3,21 @@
 //! A conformal map into the plane scales lengths by e⁻ᵘ, where −Δu is the Gaussian curvature and u = 0 on a free
 //! boundary. Where u peaks there is more surface than its surroundings leave room for, and a cut from there to the boundary
 //! gives it room: so M. Ben-Chen, C. Gotsman, G. Bunin place their cones (Conformal flattening by curvature prescription and
-//! metric scaling, Eurographics 2008). And the spread of u tells the stretch of that map, which is little more than the least.
+//! metric scaling, Eurographics 2008). And the spread of u tells the stretch of that
+//! map. The map of least stretch, which need not keep angles, has far less, but more where this has more.
 
-use std::f64::consts::{FRAC_PI_6, TAU};
+use std::f64::consts::FRAC_PI_6;
 
+use super::doubled_edge::enclosed_vertex;
+use super::laplacian::Laplacian;
 use crate::distortion::RestTriangle;
-use crate::linalg::{SparseCholesky, SparseError, SparsePattern};
-use crate::mesh::{HalfedgeId, TriMesh, VertexId, measure};
+use crate::linalg::SparseError;
+use crate::mesh::{TriMesh, VertexId, measure};
 
-/// Cotangent weights are kept within these bounds: positive, so that u peaks only where there is curvature.
-const WEIGHTS: (f64, f64) = (0.05, 20.0);
 /// Peaks below this (in u: two parts in a hundred of length) are no bulge.
 const LEAST_PEAK: f64 = 0.02;
 
-/// A vertex of less angle defect is flat: half a degree, as where a piece is unfolded.
-const FLAT_DEFECT: f64 = 0.008_726_6;
-/// One of more is a corner: 30°, a third of a box's.
+/// A vertex of more angle defect is a corner: 30°, a third of a box's. What is rounder has no net worth cutting.
 const SHARP_DEFECT: f64 = FRAC_PI_6;
 
 /// How a surface bulges.
@@ -30,6 +29,8 @@ pub struct Bulge {
     pub tip: Option<VertexId>,
     /// On a closed surface its sharpest vertex, where the map is held in place of a boundary.
     pub root: Option<VertexId>,
+    /// A vertex between two edges that join the same two, which no map with straight edges can have inside.
+    pub enclosed: Option<VertexId>,
 }
 
 /// How a connected surface bulges. `rest` holds the triangle of each face. Not guaranteed: that a map of this stretch does
@@ -38,39 +39,14 @@ pub struct Bulge {
 /// # Errors
 /// [`SparseError`] where the system cannot be factored.
 pub fn bulge(mesh: &TriMesh, rest: &[RestTriangle]) -> Result<Bulge, SparseError> {
-    let n = mesh.vertex_count();
-    let defect = angle_defects(mesh);
+    let defect = measure::angle_defects(mesh);
     let is_closed = mesh.halfedges().all(|h| !mesh.is_boundary(h));
     let sharpest =
         || mesh.vertices().max_by(|a, b| defect[a.index()].total_cmp(&defect[b.index()]).then_with(|| b.cmp(a)));
     let root = if is_closed { sharpest() } else { None };
-    let is_free: Vec<bool> = mesh.vertices().map(|v| !mesh.is_boundary_vertex(v) && Some(v) != root).collect();
-
-    let weights: Vec<[f64; 3]> = rest.iter().map(|r| r.cotangents().map(|w| w.clamp(WEIGHTS.0, WEIGHTS.1))).collect();
-    let weight = |h: HalfedgeId| weights[h.face().index()][h.slot()];
-    let inner =
-        || mesh.edges().filter(|&h| !mesh.is_boundary(h)).map(|h| (h, mesh.from(h).index(), mesh.to(h).index()));
-    let pairs = inner().filter(|e| is_free[e.1] && is_free[e.2]).map(|e| (e.1 as u32, e.2 as u32));
-    let mut solver = SparseCholesky::analyse(SparsePattern::from_pairs(n, pairs))?;
-    let mut values = vec![0.0; solver.pattern().entry_count()];
-    for v in (0..n).filter(|&v| !is_free[v]) {
-        values[solver.pattern().diagonal(v)] = 1.0;
-    }
-    for (h, i, j) in inner() {
-        let w = 0.5 * (weight(h) + weight(mesh.twin(h)));
-        for v in [i, j].into_iter().filter(|&v| is_free[v]) {
-            values[solver.pattern().diagonal(v)] += w;
-        }
-        if is_free[i]
-            && is_free[j]
-            && let Some(at) = solver.pattern().position(i, j)
-        {
-            values[at] -= w;
-        }
-    }
-    let mut u: Vec<f64> = defect.iter().zip(&is_free).map(|(&d, &free)| if free { d } else { 0.0 }).collect();
-    solver.refactor(&values)?;
-    solver.solve_in_place(&mut u);
+    let is_held = |v| mesh.is_boundary_vertex(v) || Some(v) == root;
+    let mut u: Vec<f64> = mesh.vertices().map(|v| if is_held(v) { 0.0 } else { 2.0 * defect[v.index()] }).collect();
+    Laplacian::new(mesh, rest, is_held)?.solve_in_place(&mut u);
 
     let peak = mesh.vertices().max_by(|a, b| u[a.index()].total_cmp(&u[b.index()]).then_with(|| b.cmp(a)));
     let (mut surface, mut grown, mut shrunk) = (0.0, 0.0, 0.0);
@@ -82,31 +58,19 @@ pub fn bulge(mesh: &TriMesh, rest: &[RestTriangle]) -> Result<Bulge, SparseError
             shrunk += r.area() / squared;
         }
     }
-    Ok(Bulge { l2: (grown * shrunk).sqrt() / surface, tip: peak.filter(|v| u[v.index()] > LEAST_PEAK), root })
+    Ok(Bulge { l2: (grown * shrunk).sqrt() / surface, tip: peak.filter(|v| u[v.index()] > LEAST_PEAK), root, enclosed: enclosed_vertex(mesh) })
 }
 
 /// The inner vertices of a surface that is flat everywhere else, as of a box, sharpest first; `None` where it is curved at
 /// more than so many of them, or bent inwards. O(n).
 #[must_use]
 pub fn corners(mesh: &TriMesh, most: usize) -> Option<Vec<VertexId>> {
-    let defect = angle_defects(mesh);
-    let curved = |v: &VertexId| !mesh.is_boundary_vertex(*v) && defect[v.index()].abs() > FLAT_DEFECT;
+    let defect = measure::angle_defects(mesh);
+    let curved = |v: &VertexId| !mesh.is_boundary_vertex(*v) && defect[v.index()].abs() > measure::FLAT_DEFECT;
     let mut corners: Vec<VertexId> = mesh.vertices().filter(curved).take(most + 1).collect();
     corners.sort_by(|a, b| defect[b.index()].total_cmp(&defect[a.index()]).then_with(|| a.cmp(b)));
     let all_sharp = corners.iter().all(|v| defect[v.index()] > SHARP_DEFECT);
     (corners.len() <= most && all_sharp).then_some(corners)
-}
-
-/// 2π less the angles around each vertex.
-fn angle_defects(mesh: &TriMesh) -> Vec<f64> {
-    let mut defect = vec![TAU; mesh.vertex_count()];
-    for f in mesh.faces() {
-        let [a, b, c] = mesh.triangle_positions(f);
-        for (v, corner) in mesh.triangle(f).iter().zip([[a, b, c], [b, c, a], [c, a, b]]) {
-            defect[v.index()] -= measure::corner_angle(corner);
-        }
-    }
-    defect
 }
 
 #[cfg(test)]

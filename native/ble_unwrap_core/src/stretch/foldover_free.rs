@@ -16,13 +16,17 @@ use crate::distortion::RestTriangle;
 use crate::mesh::{FaceId, TriMesh};
 use crate::progress::Progress;
 
-/// Newton steps at most. Starts that resemble the surface take 3 to 35; vertices scattered at random are not
+/// Newton steps in a round,
+const ROUND: usize = 5;
+/// and rounds at most. Starts that resemble the surface take 3 to 35 steps; vertices scattered at random are not
 /// untangled in 120 either, and Tutte's embedding serves them sooner.
-const MAX_ITERATIONS: usize = 40;
-/// In so many steps
-const ROUND: usize = 10;
+const MOST_ROUNDS: usize = 8;
+/// In so many rounds
+const PATIENT: usize = 2;
 /// the flips must fall to this share, or it is given up.
 const LEAST_CLEARED: f64 = 0.8;
+/// ε to begin with.
+const WIDE: f64 = 1.0;
 /// Armijo's constant.
 const ARMIJO: f64 = 1e-4;
 /// Halvings before a step is given up.
@@ -40,7 +44,15 @@ pub(super) fn foldover_free(
     start: &[Point2<f64>],
     progress: &Progress,
 ) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
-    clear(mesh, rest, start, &[], 0.0, progress)
+    let mut patience = Patience::default();
+    let mut clearing = Clearing::new(mesh, rest, start.to_vec(), 0.0, WIDE)?;
+    let collapsed = |uv: &[Point2<f64>]| mesh.faces().filter(|&f| is_collapsed(mesh, rest, uv, f)).count();
+    while !clearing.is_done() {
+        if patience.ends(collapsed(&clearing.uv)) || !clearing.round(&[], progress)? {
+            return Ok(None);
+        }
+    }
+    Ok(Some(clearing.uv))
 }
 
 /// Whether a triangle is flipped or so nearly collapsed that Newton's steps would end there.
@@ -49,7 +61,7 @@ pub(super) fn is_collapsed(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f
 }
 
 /// As [`foldover_free`], but only vertices near flipped or collapsed triangles move: all whose triangles are fewer than
-/// `rings` away from one. Costs what lies there.
+/// `rings` away from one. Costs what lies there; after each round that is less.
 pub(super) fn foldover_free_near(
     mesh: &TriMesh,
     rest: &[RestTriangle],
@@ -57,57 +69,101 @@ pub(super) fn foldover_free_near(
     rings: usize,
     progress: &Progress,
 ) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
-    let bad: Vec<bool> = mesh.faces().map(|f| is_collapsed(mesh, rest, start, f)).collect();
-    if !bad.contains(&true) {
-        return Ok(first_flip(mesh, start).is_none().then(|| start.to_vec()));
-    }
-    let near = Neighbourhood::new(mesh, rest, &bad, rings);
-    let Some(cleared) = clear(&near.mesh, &near.rest, &near.read(start), &near.pinned, COLLAPSED, progress)? else {
-        return Ok(None);
-    };
     let mut uv = start.to_vec();
-    near.write(&cleared, &mut uv);
-    Ok(first_flip(mesh, &uv).is_none().then_some(uv))
+    let mut patience = Patience::default();
+    let mut epsilon = WIDE;
+    loop {
+        let bad: Vec<bool> = mesh.faces().map(|f| is_collapsed(mesh, rest, &uv, f)).collect();
+        let count = bad.iter().filter(|b| **b).count();
+        if count == 0 {
+            return Ok(first_flip(mesh, &uv).is_none().then_some(uv));
+        }
+        if patience.ends(count) {
+            return Ok(None);
+        }
+        let near = Neighbourhood::new(mesh, rest, &bad, rings);
+        let mut clearing = Clearing::new(&near.mesh, &near.rest, near.read(&uv), COLLAPSED, epsilon)?;
+        if !clearing.round(&near.pinned, progress)? {
+            return Ok(None);
+        }
+        epsilon = clearing.energy.epsilon;
+        near.write(&clearing.uv, &mut uv);
+    }
 }
 
-/// `pinned` says which vertices stay; none if it is empty. Done once no triangle is flipped and all determinants are at
-/// least `least`.
-fn clear(
-    mesh: &TriMesh,
-    rest: &[RestTriangle],
-    start: &[Point2<f64>],
-    pinned: &[bool],
+/// When to give up.
+#[derive(Default)]
+struct Patience {
+    /// Collapsed triangles before each round.
+    collapsed: Vec<usize>,
+}
+
+impl Patience {
+    /// Whether this is the end, with so many collapsed triangles left before another round.
+    fn ends(&mut self, count: usize) -> bool {
+        let rounds = self.collapsed.len();
+        self.collapsed.push(count);
+        let stagnates = rounds >= PATIENT && count as f64 > LEAST_CLEARED * self.collapsed[rounds - PATIENT] as f64;
+        let rises = rounds > 0 && count as f64 > 2.5 * self.collapsed[0] as f64 + 10.0;
+        rounds >= MOST_ROUNDS || stagnates && rounds % PATIENT == 0 || rises
+    }
+}
+
+/// A map on its way, and what a step needs.
+struct Clearing<'a> {
+    mesh: &'a TriMesh,
+    system: ChartSystem<'a>,
+    uv: Vec<Point2<f64>>,
+    trial: Vec<Point2<f64>>,
+    direction: Vec<f64>,
+    energy: FoldoverEnergy,
+    /// Done once no triangle is flipped and all determinants are at least this.
     least: f64,
-    progress: &Progress,
-) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
-    let mut system = ChartSystem::new(mesh, rest)?;
-    let mut uv = start.to_vec();
-    let mut trial = uv.clone();
-    let mut direction = vec![0.0; 2 * uv.len()];
-    let mut energy = FoldoverEnergy { epsilon: 1.0 };
-    let mut before_round = usize::MAX;
-    for iteration in 0..MAX_ITERATIONS {
-        if first_flip(mesh, &uv).is_none() && system.faces.least_determinant(&uv) >= least {
-            return Ok(Some(uv));
-        }
-        if iteration % ROUND == 0 {
-            let flips = mesh.faces().filter(|&f| is_collapsed(mesh, rest, &uv, f)).count();
-            if flips as f64 > LEAST_CLEARED * before_round as f64 {
-                return Ok(None);
+}
+
+impl<'a> Clearing<'a> {
+    fn new(
+        mesh: &'a TriMesh,
+        rest: &[RestTriangle],
+        uv: Vec<Point2<f64>>,
+        least: f64,
+        epsilon: f64,
+    ) -> Result<Self, StretchError> {
+        let (trial, direction) = (uv.clone(), vec![0.0; 2 * uv.len()]);
+        let (system, energy) = (ChartSystem::new(mesh, rest)?, FoldoverEnergy { epsilon });
+        Ok(Self { mesh, system, uv, trial, direction, energy, least })
+    }
+
+    fn is_done(&self) -> bool {
+        first_flip(self.mesh, &self.uv).is_none() && self.system.faces.least_determinant(&self.uv) >= self.least
+    }
+
+    /// Some steps, fewer if that does. `pinned` says which vertices stay; none if it is empty. False where no step is left.
+    fn round(&mut self, pinned: &[bool], progress: &Progress) -> Result<bool, StretchError> {
+        for _ in 0..ROUND {
+            if self.is_done() {
+                break;
             }
-            before_round = flips;
+            progress.check()?;
+            if !self.step(pinned) {
+                return Ok(false);
+            }
         }
-        progress.check()?;
-        let before = system.faces.value(&energy, &uv);
-        system.assemble(&energy, &uv);
-        let Some(slope) = system.solve_pinned(pinned, &mut direction) else { break };
+        Ok(true)
+    }
+
+    /// A Newton step, and ε after it. False where there is none.
+    fn step(&mut self, pinned: &[bool]) -> bool {
+        let before = self.system.faces.value(&self.energy, &self.uv);
+        self.system.assemble(&self.energy, &self.uv);
+        let Some(slope) = self.system.solve_pinned(pinned, &mut self.direction) else { return false };
         let mut step = 1.0;
         let mut after = before;
         for _ in 0..MAX_HALVINGS {
-            advance(&uv, &direction, step, &mut trial);
-            let value = system.faces.value(&energy, &trial);
+            advance(&self.uv, &self.direction, step, &mut self.trial);
+            let value = self.system.faces.value(&self.energy, &self.trial);
             if value <= before + ARMIJO * step * slope {
-                std::mem::swap(&mut uv, &mut trial);
+                std::mem::swap(&mut self.uv, &mut self.trial);
                 after = value;
                 break;
             }
@@ -115,11 +171,11 @@ fn clear(
         }
         // Equation 7 of the paper.
         let sigma = (1.0 - after / before).max(LEAST_PROGRESS);
-        let worst = system.faces.least_determinant(&uv);
-        let root = worst.hypot(energy.epsilon);
-        energy.epsilon *= if worst >= 0.0 { 1.0 - sigma } else { 1.0 - sigma * root / (worst.abs() + root) };
+        let worst = self.system.faces.least_determinant(&self.uv);
+        let root = worst.hypot(self.energy.epsilon);
+        self.energy.epsilon *= if worst >= 0.0 { 1.0 - sigma } else { 1.0 - sigma * root / (worst.abs() + root) };
+        true
     }
-    Ok(first_flip(mesh, &uv).is_none().then_some(uv))
 }
 
 #[cfg(test)]

@@ -108,7 +108,11 @@ pub fn clear_flips(
     }
     let cleared = match clear_locally(mesh, rest, &start, progress)? {
         Some(uv) => Some(uv),
-        None => foldover_free(mesh, rest, &start, progress)?,
+        None => {
+            let count = mesh.faces().filter(|&f| is_collapsed(mesh, rest, &start, f)).count();
+            let many = count > ALWAYS_FEW && count as f64 > FEW_FLIPS * mesh.face_count() as f64;
+            if many { foldover_free(mesh, rest, &start, progress)? } else { None }
+        }
     };
     Ok(cleared.map(|uv| (uv, Injective::FoldoverFree)))
 }

@@ -18,10 +18,12 @@
 mod barrier;
 mod bulge;
 mod convex_outline;
+mod doubled_edge;
 mod energy;
 mod foldover_free;
 mod grid;
 mod injective;
+mod laplacian;
 mod line_search;
 mod measure;
 mod neighbourhood;
@@ -39,6 +41,7 @@ use thiserror::Error;
 
 pub use barrier::{BOUNDARY_REACH, boundary_is_tight};
 pub use bulge::{Bulge, bulge, corners};
+pub use doubled_edge::enclosed_vertex;
 pub use injective::{Injective, InjectiveMap, clear_flips, clear_locally, make_injective};
 pub use measure::{
     l2_of_positions, l2_stretch, l2_unsigned, linf_stretch, plane_area, rescale_to_equal_area, surface_area,

@@ -7,14 +7,10 @@
 
 use nalgebra::Point2;
 
+use super::laplacian::Laplacian;
 use crate::distortion::RestTriangle;
-use crate::linalg::{SparseCholesky, SparseError, SparsePattern};
-use crate::mesh::{HalfedgeId, TriMesh};
-
-/// Cotangent weights are kept within these bounds: positive, so that few triangles flip, and well conditioned.
-const WEIGHTS: (f64, f64) = (0.05, 20.0);
-/// Relative weight on the diagonal, against the translation that the equation leaves open.
-const RIDGE: f64 = 1e-10;
+use crate::linalg::SparseError;
+use crate::mesh::TriMesh;
 
 /// Positions that draw each face as near as can be to its three corners in `drawn`, by the lengths of their sides weighted
 /// with cotangents. May have flips and overlap. O(n^1.5).
@@ -27,23 +23,9 @@ pub fn stitch(
     drawn: &[[Point2<f64>; 3]],
 ) -> Result<Vec<Point2<f64>>, SparseError> {
     let n = mesh.vertex_count();
-    let weights: Vec<[f64; 3]> = rest.iter().map(|r| r.cotangents().map(|w| w.clamp(WEIGHTS.0, WEIGHTS.1))).collect();
-    let pairs = mesh.edges().map(|h| (mesh.from(h).index() as u32, mesh.to(h).index() as u32));
-    let mut solver = SparseCholesky::analyse(SparsePattern::from_pairs(n, pairs))?;
-    let mut values = vec![0.0; solver.pattern().entry_count()];
+    let mut laplacian = Laplacian::new(mesh, rest, |_| false)?;
     let mut rhs = vec![0.0; 2 * n];
-    let weight = |h: HalfedgeId| weights[h.face().index()][h.slot()];
-    for h in mesh.edges() {
-        let (i, j) = (mesh.from(h).index(), mesh.to(h).index());
-        let w = weight(h) + if mesh.is_boundary(h) { 0.0 } else { weight(mesh.twin(h)) };
-        for v in [i, j] {
-            values[solver.pattern().diagonal(v)] += w * (1.0 + RIDGE);
-        }
-        if let Some(at) = solver.pattern().position(i, j) {
-            values[at] -= w;
-        }
-    }
-    for ((t, weights), drawn) in mesh.triangles().iter().zip(&weights).zip(drawn) {
+    for ((t, weights), drawn) in mesh.triangles().iter().zip(&laplacian.weights).zip(drawn) {
         for k in 0..3 {
             let (i, j) = (t[k].index(), t[(k + 1) % 3].index());
             let side = (drawn[(k + 1) % 3] - drawn[k]) * weights[k];
@@ -53,8 +35,7 @@ pub fn stitch(
             }
         }
     }
-    solver.refactor(&values)?;
-    solver.solve_in_place(&mut rhs);
+    laplacian.solve_in_place(&mut rhs);
     Ok((0..n).map(|i| Point2::new(rhs[i], rhs[n + i])).collect())
 }
 

@@ -8,6 +8,7 @@ use nalgebra::Point2;
 
 use super::StretchError;
 use super::convex_outline::{circle, convex_outline};
+use super::doubled_edge::doubled_edge;
 use super::measure::surface_area;
 use super::overlap::first_flip;
 use crate::distortion::{RestTriangle, squared_stretch};
@@ -61,7 +62,8 @@ pub(super) fn tutte_attempt(
     boundary: TutteBoundary,
     progress: &Progress,
 ) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
-    if let Some((a, b)) = doubled_edge(mesh) {
+    if let Some([h, _]) = doubled_edge(mesh) {
+        let (a, b) = (mesh.from(h), mesh.to(h));
         return Err(StretchError::DoubledEdge { a, b });
     }
     let Some(mut system) = TutteSystem::new(mesh, rest, boundary)? else { return Ok(None) };
@@ -96,15 +98,6 @@ fn total_stretch(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f
     let face =
         |(t, r): (&[VertexId; 3], &RestTriangle)| r.area() * squared_stretch(&r.jacobian(t.map(|v| uv[v.index()])));
     mesh.triangles().iter().zip(rest).map(face).sum()
-}
-
-/// The ends of the first two different edges that join the same vertices. O(n log n).
-fn doubled_edge(mesh: &TriMesh) -> Option<(VertexId, VertexId)> {
-    let mut ends: Vec<_> =
-        mesh.edges().map(|h| (mesh.from(h), mesh.to(h))).map(|(a, b)| (a.min(b), a.max(b))).collect();
-    ends.sort_unstable();
-    let doubled = ends.windows(2).find(|w| w[0] == w[1]).map(|w| w[0]);
-    doubled.or_else(|| ends.iter().copied().find(|(a, b)| a == b))
 }
 
 /// The linear system: vertices of the mesh, then one for each hole.
