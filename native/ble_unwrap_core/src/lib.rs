@@ -48,8 +48,3 @@ pub use progress::{Cancelled, Progress, Stage};
 pub use report::Report;
 pub use settings::{ChartScale, Holes, LimitOver, NEVER_SEWN, Settings};
 pub use verify::{Certificate, Defect, verify};
-
-/// Temporary.
-pub fn tune(name: &str, default: f64) -> f64 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
-}

@@ -148,3 +148,12 @@ pub(crate) fn cubes(size: [usize; 3], filled: impl Fn([usize; 3]) -> bool) -> Tr
 pub(crate) fn plate(holes: usize) -> TriMesh {
     cubes([2 * holes + 1, 3, 1], |[x, y, _]| !(x % 2 == 1 && y == 1))
 }
+
+/// A sheet of 2 by 2 quads, of which two share two sides: their common corner, the only vertex above it, has no other face.
+pub(crate) fn sheet_with_a_flap() -> TriMesh {
+    let mut points: Vec<Point3<f64>> = (0..9).map(|i| Point3::new(f64::from(i % 3), f64::from(i / 3), 0.0)).collect();
+    points.push(Point3::new(1.3, 1.0, 0.2));
+    let triangles =
+        [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [4, 5, 9], [4, 9, 5], [3, 4, 7], [3, 7, 6], [4, 5, 8], [4, 8, 7]];
+    mesh(&points, &triangles)
+}

@@ -55,7 +55,7 @@ pub(super) struct Charting {
 pub(super) struct Refused(HashSet<Fingerprint>);
 
 impl Refused {
-    fn add(&mut self, patch: &Patch) {
+    pub(super) fn add(&mut self, patch: &Patch) {
         self.0.insert(Self::key(&patch.faces));
     }
 

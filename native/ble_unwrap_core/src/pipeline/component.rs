@@ -337,11 +337,7 @@ impl<'a> OnCoarse<'a> {
 
     /// What detail asks for: the collapse leaves no doubled edges.
     fn opened(&self, patch: Patch, start: Positions) -> (Patch, Positions) {
-        if self.settings.least_sewn < NEVER_SEWN {
-            relief::without_doubled_edges(patch, start)
-        } else {
-            (patch, start)
-        }
+        if self.settings.least_sewn < NEVER_SEWN { relief::without_doubled_edges(patch, start) } else { (patch, start) }
     }
 
     fn step(&self, part: &Part, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Outcome, Cancelled> {

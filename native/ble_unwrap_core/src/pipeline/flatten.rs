@@ -47,7 +47,7 @@ fn bytes_of_start(start: &Option<Positions>) -> usize {
     16 * start.as_ref().map_or(0, Vec::len)
 }
 
-/// A chart over the limit by so many times at most may come under it by one cut.
+/// A chart over the limit by so many times at most may come under it by one cut. See `LATE_DARTS` in [`super::charting`].
 const NEAR: f64 = 1.25;
 
 /// A patch flattened without flips and without overlap.
@@ -334,16 +334,23 @@ impl<'a> Trial<'a> {
                 }
                 Free::Overlaps => {}
             }
-            if limit.is_some() && !stretch::boundary_is_tangled(self.steps.mesh, &uv) {
-                if let Some(uv) = self.recall_start(Kind::Parted, &uv, || self.steps.part_boundary(&uv))? {
-                    let flat = self.apart(&uv, limit)?;
-                    if true {
-                        return Ok(flat.map_or(Flattened::Refused, Flattened::Flat));
-                    }
-                }
+            // Of a body whose start lies on itself Tutte's embedding, minimised under the barrier, makes a worse map than
+            // parts of it have: without it the meshes of `make quality` come out in 2 % fewer charts.
+            if limit.is_some() {
+                return self.parted(&uv, limit);
             }
         }
         Ok(self.flatten_apart(limit, rungs)?.map_or(Flattened::Refused, Flattened::Flat))
+    }
+
+    /// From a start without flips whose boundary runs over itself, parted.
+    fn parted(&self, start: &[Point2<f64>], limit: Option<f64>) -> Result<Flattened, StretchError> {
+        if stretch::boundary_is_tangled(self.steps.mesh, start) {
+            return Ok(Flattened::Refused);
+        }
+        let parted = self.recall_start(Kind::Parted, start, || self.steps.part_boundary(start))?;
+        let flat = parted.map(|uv| self.apart(&uv, limit)).transpose()?.flatten();
+        Ok(flat.map_or(Flattened::Refused, Flattened::Flat))
     }
 
     /// The isometric map if there is one, which needs no start.

@@ -302,7 +302,8 @@ mod tests {
 
     fn merged(family: [Option<u32>; 2], which: Which, settings: &Settings) -> (Vec<Chart>, Rungs) {
         let (mesh, polygon, charts) = halves_that_do_not_fit();
-        let charting = Charting { charts, family: family.to_vec(), rungs: Rungs::default(), refused: Refused::default() };
+        let charting =
+            Charting { charts, family: family.to_vec(), rungs: Rungs::default(), refused: Refused::default() };
         let progress = Progress::new();
         merge(&mesh, &polygon, charting, which, settings, &Run::new(&progress, None)).expect("not cancelled")
     }
@@ -332,6 +333,56 @@ mod tests {
     fn a_union_over_the_limit_stays_two_whatever_its_start() {
         let tight = Settings { stretch_limit: 1.0005, least_sewn: NEVER_SEWN, ..Settings::default() };
         assert_eq!(merged([None, None], Which::All, &tight).0.len(), 2);
+    }
+
+    #[test]
+    fn a_union_that_was_refused_before_is_not_embedded() {
+        let (mesh, polygon, charts) = halves_that_do_not_fit();
+        let progress = Progress::new();
+        let run = Run::new(&progress, None);
+        let all: Vec<FaceId> = mesh.faces().collect();
+        let whole = Patch::of_surface(&mesh, &polygon, all);
+        let mut refused = Refused::default();
+        refused.add(&whole);
+        let settings = Settings::default();
+        let charting = Charting { charts, family: vec![None, None], rungs: Rungs::default(), refused };
+        let (charts, _) = merge(&mesh, &polygon, charting, Which::All, &settings, &run).expect("not cancelled");
+        assert_eq!(charts.len(), 2);
+    }
+
+    #[test]
+    fn a_union_embedded_with_darts_may_not_lengthen_the_seam() {
+        // Two caps with a short border between them: the union of all but a ball needs cuts from pole to pole.
+        let ball = test_surfaces::sphere(3);
+        let polygon: Vec<u32> = (0..ball.face_count() as u32).collect();
+        let progress = Progress::new();
+        let run = Run::new(&progress, None);
+        let settings = Settings::default();
+        let low = |p: [Point3<f64>; 3]| p[0].z + p[1].z + p[2].z < 0.0;
+        let half = |side: bool| {
+            let faces = ball.faces().filter(|f| low(ball.triangle_positions(*f)) == side).collect();
+            let patch = Patch::of_surface(&ball, &polygon, faces);
+            charting::as_one(&patch, &settings, &mut Rungs::default(), &run).expect("not cancelled").expect("a cap")
+        };
+        let halves = [half(true), half(false)];
+        let seam = |c: &Chart| c.patch.mesh.boundary_length();
+        let border: f64 = halves.iter().map(seam).sum();
+        let whole = Patch::of_surface(&ball, &polygon, ball.faces().collect());
+        let one = charting::as_one(&whole, &settings, &mut Rungs::default(), &run).expect("not cancelled");
+        let joined = embedded(
+            &ball,
+            &polygon,
+            [&halves[0], &halves[1]],
+            &Refused::default(),
+            &settings,
+            &mut Rungs::default(),
+            &run,
+        );
+        let one = one.expect("a ball is one chart with darts");
+        match joined.expect("not cancelled") {
+            Joined::Chart(chart) => assert!(seam(&chart) <= border && seam(&one) <= border),
+            _ => assert!(seam(&one) > border),
+        }
     }
 
     #[test]

@@ -148,8 +148,7 @@ fn cut_to(patch: &Patch, tip: VertexId, root: Option<VertexId>) -> Option<Patch>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::Arc;
-
+    use crate::Progress;
     use crate::mesh::{TriMesh, measure, test_surfaces};
     use nalgebra::Point3;
 
@@ -165,13 +164,18 @@ mod tests {
         test_surfaces::mesh(&positions, &triangles)
     }
 
+    fn of<T>(patch: &Patch, stretch_limit: f64, then: impl FnOnce(Relief<'_>) -> T) -> T {
+        let progress = Progress::new();
+        let run = Run::new(&progress, None);
+        then(Relief::of(Cow::Borrowed(patch), stretch_limit, &run).expect("factored"))
+    }
+
     #[test]
     fn a_cone_gets_one_dart_from_its_tip() {
         let sheet = test_surfaces::grid(12, 12, [2.0, 2.0], 0.0);
         let cone = whole(moved(&sheet, |p| Point3::new(p.x, p.y, -2.0 * (p.x - 1.0).hypot(p.y - 1.0))));
-        let relief = Relief::of(&cone, 1.02).expect("factored");
-        assert!(!relief.is_promising());
-        let open = relief.relieved().expect("one dart does");
+        assert!(!of(&cone, 1.02, |relief| relief.is_promising()));
+        let open = of(&cone, 1.02, |relief| relief.relieved()).expect("one dart does");
         assert!(open.mesh.topology().is_disk());
         let seam = 0.5 * (open.mesh.boundary_length() - cone.mesh.boundary_length());
         let side = 5.0_f64.sqrt();
@@ -184,16 +188,14 @@ mod tests {
     #[test]
     fn a_closed_body_is_cut_open_and_a_sheet_left_alone() {
         let long = whole(moved(&test_surfaces::sphere(3), |p| Point3::new(0.2 * p.x, 0.2 * p.y, p.z)));
-        let open = Relief::of(&long, 1.1)
-            .and_then(Relief::relieved)
-            .expect("a spindle is rolled out by a cut from end to end");
+        let open =
+            of(&long, 1.1, |relief| relief.relieved()).expect("a spindle is rolled out by a cut from end to end");
         assert!(open.mesh.topology().is_disk());
         assert!((measure::total_area(&open.mesh) - long.area()).abs() < 1e-12);
         let sheet = whole(test_surfaces::grid(12, 12, [2.0, 2.0], 0.0));
-        let flat = Relief::of(&sheet, 1.1).expect("factored");
-        assert!(flat.is_promising() && flat.relieved().is_none());
+        assert!(of(&sheet, 1.1, |flat| flat.is_promising() && flat.relieved().is_none()));
         let ball = whole(test_surfaces::sphere(3));
-        assert!(Relief::of(&ball, 1.001).expect("a bulge").relieved().is_none(), "no six darts do for that limit");
+        assert!(of(&ball, 1.001, |relief| relief.relieved()).is_none(), "no six darts do for that limit");
     }
 
     #[test]
@@ -201,13 +203,16 @@ mod tests {
         let cube = test_surfaces::cubes([1, 1, 1], |_| true);
         let box_of = |mesh| whole(moved(mesh, |p| Point3::new(p.x, 2.0 * p.y, 3.0 * p.z)));
         let closed = box_of(&cube);
-        let net = Relief::of(&closed, 1.1).and_then(|r| r.net()).expect("a net");
-        assert!(net.mesh.topology().is_disk());
-        assert_eq!(stretch::corners(&net.mesh, 0), Some(Vec::new()), "no corner is left inside");
+        let unfolded = net(&closed).expect("a net");
+        assert!(unfolded.mesh.topology().is_disk());
+        assert_eq!(stretch::corners(&unfolded.mesh, 0), Some(Vec::new()), "no corner is left inside");
         let ball = whole(test_surfaces::sphere(3));
-        assert!(Relief::of(&ball, 1.1).expect("factored").net().is_none());
+        assert!(net(&ball).is_none());
         let sheet = whole(test_surfaces::grid(4, 4, [1.0, 1.0], 0.0));
-        assert!(Relief::of(&sheet, 1.1).expect("factored").net().is_none(), "nothing to cut");
+        assert!(net(&sheet).is_none(), "nothing to cut");
+        let marks = closed.mesh.halfedges().map(|h| [h, closed.mesh.twin(h)].contains(&HalfedgeId::new(0))).collect();
+        let guided = whole(TriMesh::clone(&closed.mesh).with_guides(marks));
+        assert!(net(&guided).is_none(), "the user says where it is to be cut");
     }
 
     #[test]
@@ -215,8 +220,21 @@ mod tests {
         let sheet = test_surfaces::grid(12, 12, [2.0, 2.0], 0.0);
         let cone = whole(moved(&sheet, |p| Point3::new(p.x, p.y, -2.0 * (p.x - 1.0).hypot(p.y - 1.0))));
         let uv: Vec<Point2<f64>> = cone.mesh.positions().iter().map(|p| p.xy()).collect();
-        let (open, start) = Relief::of(&cone, 1.1).and_then(|r| r.opened(&uv)).expect("a dart");
+        let (open, start) = of(&cone, 1.1, |r| r.opened(&uv)).expect("a dart");
         assert!(open.mesh.vertex_count() > cone.mesh.vertex_count());
         assert!(start.iter().zip(open.mesh.positions()).all(|(s, p)| *s == p.xy()));
+    }
+
+    #[test]
+    fn a_flat_patch_with_a_doubled_edge_is_opened_there() {
+        let sheet = test_surfaces::sheet_with_a_flap();
+        let patch = whole(sheet);
+        assert!(!of(&patch, 1.1, |relief| relief.is_promising()), "two of its edges join the same vertices");
+        let open = of(&patch, 1.1, |relief| relief.relieved()).expect("one dart does");
+        assert_eq!(stretch::enclosed_vertex(&open.mesh), None);
+        let uv: Vec<Point2<f64>> = patch.mesh.positions().iter().map(|p| p.xy()).collect();
+        let (opened, start) = without_doubled_edges(patch.clone(), uv);
+        assert_eq!(opened.mesh.triangles(), open.mesh.triangles());
+        assert!(start.iter().zip(opened.mesh.positions()).all(|(s, p)| *s == p.xy()));
     }
 }

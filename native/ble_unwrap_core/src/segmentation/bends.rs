@@ -13,6 +13,7 @@ const UNIT: f64 = 65536.0;
 const WIDEST: f64 = 100.0;
 
 /// A valley counts as a bend so many times as sharp as the same ridge: there a seam is hidden, on a ridge it shows.
+/// Over 16 models 1, 2 and 4 give 3.23, 3.29 and 3.45 charts (geometric means) with seams of 3.24, 3.20 and 3.27.
 const VALLEY: f64 = 2.0;
 
 /// 1 − cos(dihedral) of each side, more where it is a valley, in the order of the graph's links.

@@ -58,7 +58,12 @@ pub fn bulge(mesh: &TriMesh, rest: &[RestTriangle]) -> Result<Bulge, SparseError
             shrunk += r.area() / squared;
         }
     }
-    Ok(Bulge { l2: (grown * shrunk).sqrt() / surface, tip: peak.filter(|v| u[v.index()] > LEAST_PEAK), root, enclosed: enclosed_vertex(mesh) })
+    Ok(Bulge {
+        l2: (grown * shrunk).sqrt() / surface,
+        tip: peak.filter(|v| u[v.index()] > LEAST_PEAK),
+        root,
+        enclosed: enclosed_vertex(mesh),
+    })
 }
 
 /// The inner vertices of a surface that is flat everywhere else, as of a box, sharpest first; `None` where it is curved at

@@ -50,35 +50,14 @@ fn side(mesh: &TriMesh, first: FaceId, edges: [HalfedgeId; 2]) -> Vec<FaceId> {
 mod tests {
     use super::*;
     use crate::mesh::test_surfaces;
-    use nalgebra::Point3;
-
-    /// A sheet of 2 by 2 quads, of which two share two sides: their common corner, vertex 9, has no other face.
-    fn sheet_with_a_flap() -> TriMesh {
-        let mut points: Vec<Point3<f64>> =
-            (0..9).map(|i| Point3::new(f64::from(i % 3), f64::from(i / 3), 0.0)).collect();
-        points.push(Point3::new(1.3, 1.0, 0.2));
-        let triangles = [
-            [0, 1, 4],
-            [0, 4, 3],
-            [1, 2, 5],
-            [1, 5, 4],
-            [4, 5, 9],
-            [4, 9, 5],
-            [3, 4, 7],
-            [3, 7, 6],
-            [4, 5, 8],
-            [4, 8, 7],
-        ];
-        test_surfaces::mesh(&points, &triangles)
-    }
 
     #[test]
     fn the_vertex_in_a_flap_is_found_and_cutting_to_it_helps() {
-        let mesh = sheet_with_a_flap();
-        let [g, h] = doubled_edge(&mesh).expect("4 and 5 are joined twice");
-        assert!(g != h && [g, h].iter().all(|&h| mesh.from(h).index() + mesh.to(h).index() == 9));
+        let mesh = test_surfaces::sheet_with_a_flap();
+        let [g, h] = doubled_edge(&mesh).expect("the middle and the vertex right of it are joined twice");
+        assert!(g != h && [g, h].iter().all(|&h| mesh.edge_length(h) == 1.0 && mesh.position(mesh.from(h)).y == 1.0));
         let tip = enclosed_vertex(&mesh).expect("a flap");
-        assert_eq!(tip.index(), 9);
+        assert_eq!(mesh.position(tip).z, 0.2, "the vertex above the sheet");
         let path = crate::charts::shortest_path_to_boundary(&mesh, tip, None, |h| mesh.edge_length(h), |_| false);
         let path = path.expect("a boundary");
         let all: Vec<FaceId> = mesh.faces().collect();

@@ -25,7 +25,12 @@ const MOST_ROUNDS: usize = 8;
 const PATIENT: usize = 2;
 /// the flips must fall to this share, or it is given up.
 const LEAST_CLEARED: f64 = 0.8;
-/// ε to begin with.
+/// It is given up, too, once they have risen to so many times as many as there were,
+const MOST_RISEN: f64 = 2.5;
+/// and so many more: of 1,300 clearings that ended well one in ten rose so high, of 500 that failed half did, at the end of
+/// their first round.
+const RISE_FORGIVEN: f64 = 10.0;
+/// ε to begin with, the paper's. Over 16 models 0.3, 0.1, 0.03 give more charts, by 1, 7 and 22 %, and 2 gives 9 % more.
 const WIDE: f64 = 1.0;
 /// Armijo's constant.
 const ARMIJO: f64 = 1e-4;
@@ -104,7 +109,7 @@ impl Patience {
         let rounds = self.collapsed.len();
         self.collapsed.push(count);
         let stagnates = rounds >= PATIENT && count as f64 > LEAST_CLEARED * self.collapsed[rounds - PATIENT] as f64;
-        let rises = rounds > 0 && count as f64 > 2.5 * self.collapsed[0] as f64 + 10.0;
+        let rises = rounds > 0 && count as f64 > MOST_RISEN * self.collapsed[0] as f64 + RISE_FORGIVEN;
         rounds >= MOST_ROUNDS || stagnates && rounds % PATIENT == 0 || rises
     }
 }

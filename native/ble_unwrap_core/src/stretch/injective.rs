@@ -14,7 +14,8 @@ use crate::progress::Progress;
 
 /// Up to this share of flipped triangles, and always if they are no more than
 const FEW_FLIPS: f64 = 0.1;
-/// so many, they are cleared in their neighbourhoods of so many rings,
+/// so many, they are cleared in their neighbourhoods of so many rings, and else all vertices are moved. Those that resist in
+/// their neighbourhoods resist there, too,
 const ALWAYS_FEW: usize = 8;
 /// the second only where the first was too narrow.
 const NEIGHBOURHOODS: [usize; 2] = [3, 8];
@@ -106,13 +107,10 @@ pub fn clear_flips(
             return Ok(Some((start, Injective::AlreadyWas)));
         }
     }
-    let cleared = match clear_locally(mesh, rest, &start, progress)? {
-        Some(uv) => Some(uv),
-        None => {
-            let count = mesh.faces().filter(|&f| is_collapsed(mesh, rest, &start, f)).count();
-            let many = count > ALWAYS_FEW && count as f64 > FEW_FLIPS * mesh.face_count() as f64;
-            if many { foldover_free(mesh, rest, &start, progress)? } else { None }
-        }
+    let cleared = if are_few(collapsed(mesh, rest, &start), mesh) {
+        clear_locally(mesh, rest, &start, progress)?
+    } else {
+        foldover_free(mesh, rest, &start, progress)?
     };
     Ok(cleared.map(|uv| (uv, Injective::FoldoverFree)))
 }
@@ -128,11 +126,11 @@ pub fn clear_locally(
     start: &[Point2<f64>],
     progress: &Progress,
 ) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
-    let count = mesh.faces().filter(|&f| is_collapsed(mesh, rest, start, f)).count();
+    let count = collapsed(mesh, rest, start);
     if count == 0 {
         return Ok(first_flip(mesh, start).is_none().then(|| start.to_vec()));
     }
-    if count > ALWAYS_FEW && count as f64 > FEW_FLIPS * mesh.face_count() as f64 {
+    if !are_few(count, mesh) {
         return Ok(None);
     }
     let bad: Vec<bool> = mesh.faces().map(|f| is_collapsed(mesh, rest, start, f)).collect();
@@ -144,6 +142,15 @@ pub fn clear_locally(
         }
     }
     Ok(None)
+}
+
+/// Number of flipped or collapsed triangles.
+fn collapsed(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> usize {
+    mesh.faces().filter(|&f| is_collapsed(mesh, rest, uv, f)).count()
+}
+
+fn are_few(count: usize, mesh: &TriMesh) -> bool {
+    count <= ALWAYS_FEW || count as f64 <= FEW_FLIPS * mesh.face_count() as f64
 }
 
 #[cfg(test)]
