@@ -19,10 +19,10 @@ use crate::stretch;
 use super::flatten::NEGLIGIBLE;
 use super::rungs::{Rung, Rungs};
 
-/// A crest has a face of more L-infinity stretch than this. With 2 in its place it falls by another half per cent over
-/// the atlases of 16 models, and their seams grow by 1 % in place of 0.3 %.
+/// A crest has a face of more L-infinity stretch than this. Over 16 models in several triangulations 2, 2.5 and 3 take 14, 13
+/// and 11 % off the atlases' L-infinity stretch (geometric means) and add 0.8, 0.3 and 0.1 % to their seams.
 const CRUSHED: f64 = 2.5;
-/// A crest goes as far as the stretch is more than this,
+/// It goes as far as the stretch is more than this,
 const CREST: f64 = 2.0;
 /// over no more polygons once it has so many faces.
 const MOST_FACES: usize = 32;
@@ -31,7 +31,7 @@ const MOST_CRESTS: usize = 8;
 /// Ways to hand over a crest that are tried.
 const MOST_WAYS: usize = 3;
 /// It pays where the logarithm of the crest's worst stretch falls by so many times the share of the chart's boundary that is
-/// added to the border: 1 % more of it for a third less stretch.
+/// added to the border: a third less stretch for 1 % more of it.
 const PRICE: f64 = 40.0;
 
 /// The charts with their crests handed over. They are made of faces of `mesh` and come sorted by lowest face; those under
