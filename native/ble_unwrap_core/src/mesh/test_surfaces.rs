@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::Point3;
 
-use super::TriMesh;
+use super::{HalfedgeId, TriMesh};
 
 /// A mesh from clean triangles; vertices are numbered by first use.
 pub(crate) fn mesh(positions: &[Point3<f64>], triangles: &[[u32; 3]]) -> TriMesh {
@@ -153,7 +153,17 @@ pub(crate) fn plate(holes: usize) -> TriMesh {
 pub(crate) fn sheet_with_a_flap() -> TriMesh {
     let mut points: Vec<Point3<f64>> = (0..9).map(|i| Point3::new(f64::from(i % 3), f64::from(i / 3), 0.0)).collect();
     points.push(Point3::new(1.3, 1.0, 0.2));
-    let triangles =
-        [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [4, 5, 9], [4, 9, 5], [3, 4, 7], [3, 7, 6], [4, 5, 8], [4, 8, 7]];
-    mesh(&points, &triangles)
+    let corners: Vec<u32> =
+        [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [4, 5, 9], [4, 9, 5], [3, 4, 7], [3, 7, 6], [4, 5, 8], [4, 8, 7]]
+            .concat();
+    let side = |h: usize| (corners[h], corners[h - h % 3 + (h + 1) % 3]);
+    let is_flap = |h: usize| [4, 5].contains(&(h / 3));
+    let twin = |h: usize| {
+        // Of the four faces at one edge those of the flap are each glued to one of the others.
+        let is_twin = |&t: &usize| {
+            side(t) == (side(h).1, side(h).0) && (side(h) != (4, 5) && side(h) != (5, 4) || is_flap(t) != is_flap(h))
+        };
+        (0..corners.len()).find(is_twin).map_or(HalfedgeId::NONE, HalfedgeId::new)
+    };
+    TriMesh::from_glued(&corners, (0..corners.len()).map(twin).collect(), |source| points[source as usize]).0
 }

@@ -23,6 +23,7 @@ use super::flatten::{self, Polished, Positions};
 use super::memo::{self, Fingerprint, Kind, Run};
 use super::merge::{self, Which};
 use super::prolong::{Prolonged, prolong};
+use super::recut::recut;
 use super::relief;
 use super::rungs::{Rung, Rungs};
 use super::tally::Tally;
@@ -75,6 +76,7 @@ pub(super) fn charts(
         let charts = fine.charts(settings, &mut rungs, &|faces| tally.add(faces, 1.0), progress)?;
         fine.sew(charts, settings, &mut rungs, progress)?.into_iter().map(|sewn| sewn.chart).collect()
     };
+    charts = recut(&whole.mesh, &whole.polygon, charts, settings, &mut rungs, progress)?;
     for f in charts.iter_mut().flat_map(|c| &mut c.patch.faces) {
         *f = faces[f.index()];
     }

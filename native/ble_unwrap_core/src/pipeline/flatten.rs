@@ -25,7 +25,7 @@ const MOST_P99_STRETCH: f64 = 4.0;
 /// half a per cent of strain 1.006. What is above has folded away area that lies in thin faces.
 const ISOMETRIC: f64 = 1.01;
 /// Height (the whole surface has area 1) up to which a face's lengths are rounding.
-const NEGLIGIBLE: f64 = 1e-8;
+pub(super) const NEGLIGIBLE: f64 = 1e-8;
 /// An embedding folded over more of its area than this is near no flat map. Of 598 trials on three
 /// development models 275 were above; 7 of these ended under the limit, after most of the time spent on all. The printed
 /// model folds even what is flat, so of it this tells nothing.

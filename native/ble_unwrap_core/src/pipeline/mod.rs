@@ -16,6 +16,7 @@ mod flatten;
 mod memo;
 mod merge;
 mod prolong;
+mod recut;
 mod relief;
 mod ribbons;
 mod rigid;

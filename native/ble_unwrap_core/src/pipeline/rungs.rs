@@ -35,10 +35,12 @@ pub enum Rung {
     Thicken,
     /// Two charts joined to one.
     Merge,
+    /// A few polygons crushed at a border were handed over it.
+    Recut,
 }
 
 impl Rung {
-    const ALL: [Self; 16] = [
+    const ALL: [Self; 17] = [
         Self::Plane,
         Self::Unfold,
         Self::Projection,
@@ -55,6 +57,7 @@ impl Rung {
         Self::Separate,
         Self::Thicken,
         Self::Merge,
+        Self::Recut,
     ];
 
     /// A short name for reports.
@@ -77,6 +80,7 @@ impl Rung {
             Self::Separate => "separate",
             Self::Thicken => "thicken",
             Self::Merge => "merge",
+            Self::Recut => "recut",
         }
     }
 }
