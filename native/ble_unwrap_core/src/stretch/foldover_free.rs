@@ -110,7 +110,7 @@ impl Patience {
         self.collapsed.push(count);
         let stagnates = rounds >= PATIENT && count as f64 > LEAST_CLEARED * self.collapsed[rounds - PATIENT] as f64;
         let rises = rounds > 0 && count as f64 > MOST_RISEN * self.collapsed[0] as f64 + RISE_FORGIVEN;
-        rounds >= MOST_ROUNDS || stagnates && rounds % PATIENT == 0 || rises
+        rounds >= MOST_ROUNDS || stagnates && rounds.is_multiple_of(PATIENT) || rises
     }
 }
 
