@@ -63,12 +63,13 @@ pub struct Settings {
     /// Whether large components are cut on a coarse mesh first. Off, as in the paper's presets, patches are embedded by all
     /// landmarks and ribbons stay whole, too.
     pub coarse: bool,
-    /// Whether neighbouring charts are joined again where their union stays under the limit.
+    /// Whether neighbouring charts are joined again where their union stays under the limit, and crushed polygons at their
+    /// borders handed over.
     pub merge: bool,
     /// Charts whose union would be over the limit are sewn along a part of their border, the rest being left as a dart,
     /// where that part is at least this share of the square root of the smaller one's area: less for fewer charts and a
-    /// shorter seam, more for compact charts. From [`NEVER_SEWN`] on none are, nor are patches cut by darts before they are
-    /// split.
+    /// shorter seam, more for compact charts. From [`NEVER_SEWN`] on none are, nor are patches cut by darts or to
+    /// nets before they are split, nor crushed polygons handed over borders.
     pub least_sewn: f64,
     /// Holes of charts.
     pub holes: Holes,

@@ -131,11 +131,12 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 /// coarse : bool
 ///     Whether large pieces of surface are cut into charts on a coarse mesh first, which is many times faster.
 /// merge : bool
-///     Whether charts are joined again where their union stays under the limit.
+///     Whether charts are joined again where their union stays under the limit, and crushed polygons at their borders
+///     handed over.
 /// least_sewn : float, 0 to 1000
 ///     Charts are sewn along a part of their border, the rest left as a dart, where that is at least this share of the
 ///     square root of the smaller one's area. Less for fewer charts, more for compact ones, 1000 for no darts
-///     of any kind.
+///     of any kind, no nets and nothing handed over.
 /// holes : {"keep", "cut"}
 ///     Whether charts may have holes or are cut to disks.
 /// chart_scale : {"uniform", "stretch"}

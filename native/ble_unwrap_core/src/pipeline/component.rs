@@ -337,7 +337,7 @@ impl<'a> OnCoarse<'a> {
         Ok(Charting { charts, family, rungs: charting.rungs, refused: charting.refused })
     }
 
-    /// What detail asks for: the collapse leaves no doubled edges.
+    /// A patch and its start, cut open where two edges join the same vertices, as far as the coarse chart was not.
     fn opened(&self, patch: Patch, start: Positions) -> (Patch, Positions) {
         if self.settings.least_sewn < NEVER_SEWN { relief::without_doubled_edges(patch, start) } else { (patch, start) }
     }

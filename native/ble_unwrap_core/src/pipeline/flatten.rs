@@ -8,7 +8,7 @@ use crate::charts::{Chart, Patch};
 use crate::distortion::{self, RestTriangle};
 use crate::embedding::{self, EmbeddingError, Model};
 use crate::geodesics::LandmarkDistances;
-use crate::mesh::FaceId;
+use crate::mesh::{FaceId, TriMesh};
 use crate::progress::Cancelled;
 use crate::settings::Settings;
 use crate::stretch::{self, BOUNDARY_REACH, Minimised, StretchError};
@@ -37,7 +37,7 @@ const HOPELESS_START: f64 = 4.0;
 /// Charts sewn together begin nearer to their minimum or not at all.
 const HOPELESS_SEWN: f64 = 2.0;
 
-/// Where even the start of a patch of more faces lies on itself it is refused: Tutte's embedding on a circle costs much there,
+/// Where even the start of a patch of more faces lies on itself and cannot be parted it is refused: Tutte's embedding on a circle costs much there,
 /// and leads to a map under the limit one time in five. A wireframe of many short tubes has 174 charts with it, 261 without.
 const MOST_FOR_TUTTE: usize = 100;
 
@@ -338,24 +338,25 @@ impl<'a> Trial<'a> {
                 }
                 Free::Overlaps => {}
             }
-            if limit.is_some()
-                && (self.patch.mesh.face_count() > MOST_FOR_TUTTE
-                    || !stretch::boundary_is_tangled(self.steps.mesh, &uv))
-            {
-                return self.parted(&uv, limit);
+            if limit.is_some() {
+                if let Some(flat) = self.parted(&uv, limit)? {
+                    return Ok(Flattened::Flat(flat));
+                }
+                if self.patch.mesh.face_count() > MOST_FOR_TUTTE {
+                    return Ok(Flattened::Refused);
+                }
             }
         }
         Ok(self.flatten_apart(limit, rungs)?.map_or(Flattened::Refused, Flattened::Flat))
     }
 
-    /// From a start without flips whose boundary runs over itself, parted.
-    fn parted(&self, start: &[Point2<f64>], limit: Option<f64>) -> Result<Flattened, StretchError> {
+    /// From a start without flips whose boundary runs over itself here and there, parted.
+    fn parted(&self, start: &[Point2<f64>], limit: Option<f64>) -> Result<Option<Flat>, StretchError> {
         if stretch::boundary_is_tangled(self.steps.mesh, start) {
-            return Ok(Flattened::Refused);
+            return Ok(None);
         }
         let parted = self.recall_start(Kind::Parted, start, || self.steps.part_boundary(start))?;
-        let flat = parted.map(|uv| self.apart(&uv, limit)).transpose()?.flatten();
-        Ok(flat.map_or(Flattened::Refused, Flattened::Flat))
+        Ok(parted.map(|uv| self.apart(&uv, limit)).transpose()?.flatten())
     }
 
     /// The isometric map if there is one, which needs no start.
@@ -523,27 +524,31 @@ impl<'a> Trial<'a> {
     /// A chart of this map; the map again where it is over the limit.
     fn judge(&self, uv: Positions, limit: Option<f64>) -> Result<Flat, Positions> {
         let l2 = l2(self.patch, &self.steps.rest, &uv);
-        let good = limit.is_none_or(|limit| l2 <= limit && self.p99_stretch(&uv) <= MOST_P99_STRETCH);
+        let good = limit.is_none_or(|limit| l2 <= limit && is_sharp(self.steps.mesh, &self.steps.rest, &uv));
         if good { Ok(Flat { uv, l2 }) } else { Err(uv) }
     }
+}
 
-    /// The stretch that 99 % of the area stays under, with the chart at the area of its surface.
-    fn p99_stretch(&self, uv: &[Point2<f64>]) -> f64 {
-        let (mesh, rest) = (self.steps.mesh, &self.steps.rest);
-        let squared = |f: FaceId| {
-            let corners = mesh.triangle(f).map(|v| uv[v.index()]);
-            distortion::squared_stretch(&rest[f.index()].jacobian(corners))
-        };
-        let mut faces: Vec<(f64, f64)> = mesh.faces().map(|f| (squared(f), rest[f.index()].area())).collect();
-        faces.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let total: f64 = faces.iter().map(|f| f.1).sum();
-        let mut below = 0.0;
-        let p99 = faces.iter().find(|f| {
-            below += f.1;
-            below >= 0.99 * total
-        });
-        p99.map_or(1.0, |f| (f.0 * stretch::plane_area(mesh, uv) / total).sqrt())
-    }
+/// Whether so little of a map is stretched so much that nobody sees it blurred.
+pub(super) fn is_sharp(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> bool {
+    p99_stretch(mesh, rest, uv) <= MOST_P99_STRETCH
+}
+
+/// The stretch that 99 % of the area stays under, with the chart at the area of its surface.
+fn p99_stretch(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
+    let squared = |f: FaceId| {
+        let corners = mesh.triangle(f).map(|v| uv[v.index()]);
+        distortion::squared_stretch(&rest[f.index()].jacobian(corners))
+    };
+    let mut faces: Vec<(f64, f64)> = mesh.faces().map(|f| (squared(f), rest[f.index()].area())).collect();
+    faces.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = faces.iter().map(|f| f.1).sum();
+    let mut below = 0.0;
+    let p99 = faces.iter().find(|f| {
+        below += f.1;
+        below >= 0.99 * total
+    });
+    p99.map_or(1.0, |f| (f.0 * stretch::plane_area(mesh, uv) / total).sqrt())
 }
 
 /// A patch that defeats a solver or has no injective map is refused like one that is too stretched.

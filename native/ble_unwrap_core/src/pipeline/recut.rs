@@ -16,7 +16,7 @@ use crate::progress::{Cancelled, Progress};
 use crate::settings::{Holes, NEVER_SEWN, Settings};
 use crate::stretch;
 
-use super::flatten::NEGLIGIBLE;
+use super::flatten::{self, NEGLIGIBLE};
 use super::rungs::{Rung, Rungs};
 
 /// A crest has a face of more L-infinity stretch than this. Over 16 models in several triangulations 2, 2.5 and 3 take 14, 12
@@ -26,17 +26,19 @@ const CRUSHED: f64 = 2.5;
 const CREST: f64 = 2.0;
 /// over no more polygons once it has so many faces.
 const MOST_FACES: usize = 32;
-/// Crests of a chart.
-const MOST_CRESTS: usize = 8;
+/// A crest of more triangles, as large polygons have, stays.
+const LARGEST: usize = 256;
+/// Faces of a chart, its worst, at which a crest may begin.
+const MOST_BEGINNINGS: usize = 8;
 /// Ways to hand over a crest that are tried.
 const MOST_WAYS: usize = 3;
-/// It pays where the logarithm of the crest's worst stretch falls by so many times the share of the chart's boundary that is
+/// It pays where the logarithm of the stretch it began at falls by so many times the share of the chart's boundary that is
 /// added to the border: a third less stretch for 1 % more of it.
 const PRICE: f64 = 40.0;
 
 /// The charts with their crests handed over. They are made of faces of `mesh` and come sorted by lowest face; those under
-/// the limit stay so, the L2 stretch of all together does not rise, all stay injective, and edges of guides stay borders. At most 2 · [`MOST_CRESTS`] · [`MOST_WAYS`] trials
-/// a chart, each linear in the faces of two charts; mostly none.
+/// the limit stay so, the L2 stretch of all together does not rise, all stay injective, and edges of guides stay borders.
+/// At most 2 · [`MOST_BEGINNINGS`] · [`MOST_WAYS`] trials a chart, each O(n log n) in the faces of two charts; mostly none.
 pub(super) fn recut(
     mesh: &TriMesh,
     polygon: &[u32],
@@ -50,21 +52,22 @@ pub(super) fn recut(
     }
     let unit = mesh.halfedges().map(|h| mesh.edge_length(h)).sum::<f64>() / mesh.halfedge_count().max(1) as f64;
     let place = vec![(usize::MAX, FaceId::NONE); mesh.face_count()];
-    let mut table = Table { mesh, polygon, settings, unit, place, charts };
+    let boundary = vec![0.0; charts.len()];
+    let mut table = Table { mesh, polygon, settings, unit, place, charts, boundary };
     (0..table.charts.len()).for_each(|i| table.claim(i));
-    let mut refused = BTreeSet::new();
+    let mut tried = BTreeSet::new();
     for (before, worst) in table.crushed() {
         progress.check()?;
         // Gone with another.
         if table.stretch(worst) < before {
             continue;
         }
-        let whole = if refused.contains(&worst) { Vec::new() } else { table.crest(worst, CREST) };
+        let whole = if tried.contains(&worst) { Vec::new() } else { table.crest(worst, CREST) };
         let alone = table.crest(worst, f64::INFINITY);
-        if [&whole, &alone].into_iter().any(|crest| table.hand_over(crest, before)) {
+        if table.hand_over(&whole, before) || (alone != whole && table.hand_over(&alone, before)) {
             rungs.take(Rung::Recut);
         }
-        refused.extend(whole);
+        tried.extend(whole);
     }
     let mut charts = table.charts;
     charts.sort_by_key(|c| c.patch.faces.iter().min().copied());
@@ -83,6 +86,8 @@ struct Table<'a> {
     /// The chart of each face, and its number there.
     place: Vec<(usize, FaceId)>,
     charts: Vec<Chart>,
+    /// Lengths of the charts' boundaries.
+    boundary: Vec<f64>,
 }
 
 impl Table<'_> {
@@ -91,6 +96,7 @@ impl Table<'_> {
         for (local, f) in self.charts[i].patch.faces.iter().enumerate() {
             self.place[f.index()] = (i, FaceId::new(local));
         }
+        self.boundary[i] = self.charts[i].patch.mesh.boundary_length();
     }
 
     /// The charts on both sides of an edge.
@@ -136,14 +142,15 @@ impl Table<'_> {
             let measured = mesh.faces().filter(at_border).map(|f| (self.stretch(names[f.index()]), names[f.index()]));
             let mut own: Vec<(f64, FaceId)> = measured.filter(|s| s.0 > CRUSHED).collect();
             own.sort_by(worst_first);
-            own.truncate(MOST_CRESTS);
+            own.truncate(MOST_BEGINNINGS);
             crushed.extend(own);
         }
         crushed.sort_by(worst_first);
         crushed
     }
 
-    /// A face with those that hang together with it in its chart and are stretched more than this, by whole polygons.
+    /// A face with those that hang together with it in its chart and are stretched more than this, by whole polygons,
+    /// ascending; none where these are large.
     fn crest(&self, worst: FaceId, least: f64) -> Vec<FaceId> {
         let mut faces = vec![worst];
         let mut at = 0;
@@ -157,7 +164,11 @@ impl Table<'_> {
                 }
             }
             at += 1;
+            if faces.len() > LARGEST {
+                return Vec::new();
+            }
         }
+        faces.sort_unstable();
         faces
     }
 
@@ -184,7 +195,7 @@ impl Table<'_> {
         let mesh = self.mesh;
         let is_way = |h: &HalfedgeId| {
             let t = mesh.twin(*h);
-            !t.is_none() && self.is_border(*h) && !mesh.is_guide(*h) && !crest.contains(&t.face())
+            !t.is_none() && self.is_border(*h) && !mesh.is_guide(*h) && !is_in(crest, t.face())
         };
         let beyond = |h: HalfedgeId| self.sides(h)[1];
         let mut edges: Vec<HalfedgeId> = crest.iter().flat_map(|f| f.halfedges()).filter(is_way).collect();
@@ -205,17 +216,17 @@ impl Table<'_> {
     fn handed_over(&self, crest: &[FaceId], way: &[HalfedgeId], before: f64) -> Option<[Option<Chart>; 2]> {
         let mesh = self.mesh;
         let [a, b] = self.sides(way[0]);
-        let is_new = |h: &HalfedgeId| !self.is_border(*h) && !crest.contains(&mesh.twin(*h).face());
+        let is_new = |h: &HalfedgeId| !self.is_border(*h) && !is_in(crest, mesh.twin(*h).face());
         let new: Vec<HalfedgeId> = crest.iter().flat_map(|f| f.halfedges()).filter(is_new).collect();
-        let added = (self.length(&new) - self.length(way)) / self.charts[a].patch.mesh.boundary_length();
+        let added = (self.length(&new) - self.length(way)) / self.boundary[a];
         let pays = |after: f64| after < before && (before / after).ln() >= PRICE * added;
-        let stays: Vec<FaceId> = self.charts[a].patch.faces.iter().copied().filter(|f| !crest.contains(f)).collect();
+        let stays: Vec<FaceId> = self.charts[a].patch.faces.iter().copied().filter(|f| !is_in(crest, *f)).collect();
         if stays.is_empty() || !pays(1.0) {
             return None;
         }
         let is_cut = |h: HalfedgeId| {
             let t = mesh.twin(h);
-            let is_outline = crest.contains(&h.face()) != crest.contains(&t.face());
+            let is_outline = is_in(crest, h.face()) != is_in(crest, t.face());
             if is_outline { !way.contains(&h) && !way.contains(&t) } else { self.is_border(h) }
         };
         let cut_out = |faces: Vec<FaceId>| Patch::cut_out(mesh, self.polygon, faces, is_cut);
@@ -225,7 +236,7 @@ impl Table<'_> {
             faces.sort_unstable();
         }
         let to = self.lying(cut_out(faces), &self.unfolded(crest, way[0]))?;
-        let drawn = to.patch.faces.iter().zip(to.patch.mesh.triangles()).filter(|(f, _)| crest.contains(f));
+        let drawn = to.patch.faces.iter().zip(to.patch.mesh.triangles()).filter(|(f, _)| is_in(crest, **f));
         let after = drawn.map(|(f, t)| self.stretch_at(*f, t.map(|v| to.uv[v.index()]))).fold(0.0, f64::max);
         if !pays(after) {
             return None;
@@ -236,7 +247,7 @@ impl Table<'_> {
         (energy(&to) + from.as_ref().map_or(0.0, energy) <= old).then_some([from, Some(to)])
     }
 
-    /// A crest unfolded from the other side of an edge of its outline.
+    /// A crest unfolded from the other side of an edge of its outline; by face.
     fn unfolded(&self, crest: &[FaceId], first: HalfedgeId) -> Vec<(FaceId, Corners)> {
         let twin = self.mesh.twin(first);
         let beyond = self.corners(twin.face());
@@ -258,11 +269,12 @@ impl Table<'_> {
             drawn.push((f, corners));
             for g in f.halfedges().into_iter().filter(|&g| !self.is_border(g)) {
                 let t = self.mesh.twin(g);
-                if crest.contains(&t.face()) {
+                if is_in(crest, t.face()) {
                     open.push((t, [corners[(g.slot() + 1) % 3], corners[g.slot()]]));
                 }
             }
         }
+        drawn.sort_by_key(|d| d.0);
         drawn
     }
 
@@ -276,17 +288,23 @@ impl Table<'_> {
         }
         let mut uv = vec![Point2::origin(); mesh.vertex_count()];
         let mut put = |t: &[VertexId; 3], corners: Corners| t.iter().zip(corners).for_each(|(v, p)| uv[v.index()] = p);
-        let anew = |f: &FaceId| drawn.iter().find(|d| d.0 == *f);
+        let anew = |f: &FaceId| drawn.binary_search_by_key(f, |d| d.0).ok().map(|at| drawn[at].1);
         let faces = || patch.faces.iter().zip(mesh.triangles());
-        faces().filter_map(|(f, t)| Some((t, anew(f)?.1))).for_each(|(t, corners)| put(t, corners));
+        faces().filter_map(|(f, t)| Some((t, anew(f)?))).for_each(|(t, corners)| put(t, corners));
         // What has been there stays, so it comes last.
         faces().filter(|(f, _)| anew(f).is_none()).for_each(|(f, t)| put(t, self.corners(*f)));
         if stretch::first_flip(mesh, &uv).is_some() || !stretch::boundary_is_simple(mesh, &uv) {
             return None;
         }
         let l2 = stretch::l2_of_positions(mesh, &uv, NEGLIGIBLE);
-        (l2 <= self.settings.stretch_limit).then_some(Chart { patch, uv, l2 })
+        let good = l2 <= self.settings.stretch_limit && flatten::is_sharp(mesh, &RestTriangle::of_mesh(mesh), &uv);
+        good.then_some(Chart { patch, uv, l2 })
     }
+}
+
+/// Whether a face is among some in ascending order.
+fn is_in(faces: &[FaceId], face: FaceId) -> bool {
+    faces.binary_search(&face).is_ok()
 }
 
 #[cfg(test)]
@@ -394,7 +412,7 @@ mod tests {
         let on_cut = |v| mesh.position(v).y.abs() < 1e-9 && mesh.position(v).x > 0.0;
         let cut: Vec<_> = mesh.edges().filter(|&h| on_cut(mesh.from(h)) && on_cut(mesh.to(h))).collect();
         let patch = Patch::whole(mesh.clone().into(), all.clone()).cut(&cut);
-        let flat = super::super::flatten::isometric(&patch, &mut Rungs::default()).expect("it unrolls");
+        let flat = flatten::isometric(&patch, &mut Rungs::default()).expect("it unrolls");
         let mut chart = flat.into_chart(patch);
         // A vertex in the middle of one side, moved in by three quarters of an edge.
         let loops = chart.patch.mesh.boundary_loops();

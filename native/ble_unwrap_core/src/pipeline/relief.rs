@@ -102,7 +102,7 @@ pub(super) fn net(patch: &Patch) -> Option<Patch> {
         let root = if cuts == 0 && is_closed { corners.first().copied() } else { None };
         let mut tips = corners.into_iter().filter(|v| Some(*v) != root).peekable();
         if tips.peek().is_none() {
-            return Some(net.into_owned());
+            return if let Cow::Owned(net) = net { Some(net) } else { None };
         }
         net = Cow::Owned(tips.find_map(|tip| cut_to(&net, tip, root))?);
     }

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use nalgebra::{Point2, Vector2};
 
 use crate::charts::{Chart, Patch};
-use crate::mesh::FaceId;
+use crate::mesh::{FaceId, HalfedgeId, VertexId};
 use crate::progress::Cancelled;
 use crate::segmentation;
 use crate::settings::{Holes, Settings};
@@ -17,9 +17,14 @@ use super::flatten;
 use super::memo::Run;
 use super::rungs::{Rung, Rungs};
 
-/// A chart is cut if a texture that holds it, whatever its turn, can be filled to no more than this share by all charts,
+/// A chart is cut if a texture that holds it, whatever its turn, can be filled to no more than this share by all charts, or
 const LEAST_FILL: f64 = 0.25;
-/// and so are its parts, until it can be filled to this.
+/// than this if it is a body that was cut open, with seams all round: there one more shows less than across a plank.
+const LEAST_FILL_OF_BODIES: f64 = 0.4;
+/// Share of its boundary along which such a body borders on itself.
+const LEAST_SELF_BORDER: f64 = 0.5;
+/// Its parts are cut,
+/// too, until it can be filled to this.
 const GOOD_FILL: f64 = 0.6;
 /// The cut runs in so much of the length around the middle.
 const MIDDLE: [f64; 2] = [0.4, 0.6];
@@ -42,7 +47,8 @@ pub(super) fn cut(
     let mut done = Vec::new();
     for chart in charts {
         progress.check()?;
-        if most_filled(&chart.uv) > LEAST_FILL {
+        let least = if self_border(&chart) > LEAST_SELF_BORDER { LEAST_FILL_OF_BODIES } else { LEAST_FILL };
+        if most_filled(&chart.uv) > least {
             done.push(chart);
             continue;
         }
@@ -63,6 +69,20 @@ pub(super) fn cut(
     }
     done.sort_by_key(|c| c.patch.faces.iter().min().copied());
     Ok(done)
+}
+
+/// Share of a chart's boundary where it has been cut open: two sides of the same edge of the surface.
+fn self_border(chart: &Chart) -> f64 {
+    let (mesh, names) = (&chart.patch.mesh, &chart.patch.vertices);
+    let ends = |h: HalfedgeId| {
+        let (v, w) = (names[mesh.from(h).index()], names[mesh.to(h).index()]);
+        (v.min(w), v.max(w))
+    };
+    let mut border: Vec<_> = mesh.halfedges().filter(|&h| mesh.is_boundary(h)).map(|h| (ends(h), h)).collect();
+    border.sort_unstable();
+    let length = |edge: &[((VertexId, VertexId), HalfedgeId)]| edge.iter().map(|e| mesh.edge_length(e.1)).sum::<f64>();
+    let cut: f64 = border.chunk_by(|a, b| a.0 == b.0).filter(|edge| edge.len() > 1).map(length).sum();
+    cut / length(&border).max(f64::MIN_POSITIVE)
 }
 
 /// By how much a texture of this width and height must be enlarged to hold points, turned as suits them best.
@@ -164,9 +184,15 @@ mod tests {
     use crate::Progress;
     use crate::mesh::test_surfaces;
     use crate::stretch;
+    use nalgebra::Point3;
 
     fn sheet(length: usize) -> Chart {
-        let mesh = test_surfaces::grid(length, 2, [length as f64, 2.0], 0.0);
+        sheet_of(length, 2)
+    }
+
+    /// As long as it has cells, and two wide.
+    fn sheet_of(length: usize, across: usize) -> Chart {
+        let mesh = test_surfaces::grid(length, across, [length as f64, 2.0], 0.0);
         let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
         let patch = Patch::whole(Arc::new(mesh), polygon);
         let uv = patch.mesh.positions().iter().map(|p| p.xy()).collect();
@@ -192,6 +218,19 @@ mod tests {
             let straight = part.patch.area() + 4.0;
             assert!((around - straight).abs() < 1e-9, "{around} {straight}: two ends of two edges each");
         }
+    }
+
+    #[test]
+    fn a_body_cut_open_is_cut_sooner_than_a_sheet_of_its_shape() {
+        let sheet = sheet_of(10, 4);
+        assert!(self_border(&sheet) == 0.0);
+        // A tube of that length, unrolled: its ends are its own border, its sides the two sides of the cut.
+        let mut tube = sheet.clone();
+        let seam = |p: &Point3<f64>| p.y == 0.0 || p.y == 2.0;
+        let name = |(i, p): (usize, &Point3<f64>)| VertexId::new(if seam(p) { 1000 + p.x as usize } else { i });
+        tube.patch.vertices = tube.patch.mesh.positions().iter().enumerate().map(name).collect();
+        assert!((self_border(&tube) - 20.0 / 24.0).abs() < 1e-9);
+        assert_eq!((cut_up(vec![sheet]).len(), cut_up(vec![tube]).len()), (1, 2));
     }
 
     #[test]

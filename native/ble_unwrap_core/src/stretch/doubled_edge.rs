@@ -5,30 +5,40 @@
 
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 
-/// One side each of the first two edges that join the same vertices, or twice that of an edge that joins a vertex to itself.
-/// O(n log n).
-pub(super) fn doubled_edge(mesh: &TriMesh) -> Option<[HalfedgeId; 2]> {
+/// Pairs of edges that are looked at; more are as good as none.
+const MOST_PAIRS: usize = 8;
+
+/// One side each of two edges that join the same vertices, or twice that of an edge that joins a vertex to itself: the first
+/// pairs, by their vertices. O(n log n).
+fn doubled_edges(mesh: &TriMesh) -> Vec<[HalfedgeId; 2]> {
     let ends = |h: HalfedgeId| (mesh.from(h).min(mesh.to(h)), mesh.from(h).max(mesh.to(h)));
     let mut edges: Vec<_> = mesh.edges().map(|h| (ends(h), h)).collect();
     edges.sort_unstable();
-    let doubled = edges.windows(2).find(|w| w[0].0 == w[1].0).map(|w| [w[0].1, w[1].1]);
-    doubled.or_else(|| edges.iter().find(|e| e.0.0 == e.0.1).map(|e| [e.1, e.1]))
+    let doubled = edges.windows(2).filter(|w| w[0].0 == w[1].0).map(|w| [w[0].1, w[1].1]);
+    let loops = edges.iter().filter(|e| e.0.0 == e.0.1).map(|e| [e.1, e.1]);
+    doubled.chain(loops).take(MOST_PAIRS).collect()
 }
 
-/// A vertex between the first two edges that join the same two: on a surface cut from it to the boundary they no longer do.
-/// `None` where there are none, or no vertex inside between them. O(n log n).
+/// The first pair of [`doubled_edges`].
+pub(super) fn doubled_edge(mesh: &TriMesh) -> Option<[HalfedgeId; 2]> {
+    doubled_edges(mesh).first().copied()
+}
+
+/// A vertex enclosed by two edges that join the same two: on a surface cut from it to the boundary these no longer do.
+/// `None` where nothing is enclosed, as in a slit of one edge, whose sides are such a pair. O(n log n).
 #[must_use]
 pub fn enclosed_vertex(mesh: &TriMesh) -> Option<VertexId> {
-    let edges = doubled_edge(mesh)?;
-    let sides = edges.iter().flat_map(|&h| [h, mesh.twin(h)]).filter(|h| !h.is_none());
-    let between = sides.map(|h| side(mesh, h.face(), edges)).min_by_key(Vec::len)?;
-    let ends = [mesh.from(edges[0]), mesh.to(edges[0])];
-    let is_inside = |v: &VertexId| !ends.contains(v) && !mesh.is_boundary_vertex(*v);
-    between.iter().flat_map(|&f| mesh.triangle(f)).filter(is_inside).min()
+    doubled_edges(mesh).into_iter().find_map(|edges| {
+        let sides = edges.into_iter().flat_map(|h| [h, mesh.twin(h)]).filter(|h| !h.is_none());
+        let between = sides.filter_map(|h| enclosed_side(mesh, h.face(), edges)).min_by_key(Vec::len)?;
+        let ends = [mesh.from(edges[0]), mesh.to(edges[0])];
+        let is_inside = |v: &VertexId| !ends.contains(v) && !mesh.is_boundary_vertex(*v);
+        between.iter().flat_map(|&f| mesh.triangle(f)).filter(is_inside).min()
+    })
 }
 
-/// The faces that hang together with one, edges aside.
-fn side(mesh: &TriMesh, first: FaceId, edges: [HalfedgeId; 2]) -> Vec<FaceId> {
+/// The faces that hang together with one, edges aside; `None` if they reach any other boundary.
+fn enclosed_side(mesh: &TriMesh, first: FaceId, edges: [HalfedgeId; 2]) -> Option<Vec<FaceId>> {
     let mut is_found = vec![false; mesh.face_count()];
     is_found[first.index()] = true;
     let mut found = vec![first];
@@ -37,13 +47,18 @@ fn side(mesh: &TriMesh, first: FaceId, edges: [HalfedgeId; 2]) -> Vec<FaceId> {
         next += 1;
         for h in f.halfedges() {
             let t = mesh.twin(h);
-            let is_border = t.is_none() || edges.contains(&h) || edges.contains(&t);
-            if !is_border && !std::mem::replace(&mut is_found[t.face().index()], true) {
+            if edges.contains(&h) || edges.contains(&t) {
+                continue;
+            }
+            if t.is_none() {
+                return None;
+            }
+            if !std::mem::replace(&mut is_found[t.face().index()], true) {
                 found.push(t.face());
             }
         }
     }
-    found
+    Some(found)
 }
 
 #[cfg(test)]
@@ -71,5 +86,19 @@ mod tests {
     fn a_plain_sheet_and_a_ball_have_none() {
         assert_eq!(enclosed_vertex(&test_surfaces::grid(4, 4, [1.0, 1.0], 0.0)), None);
         assert_eq!(enclosed_vertex(&test_surfaces::sphere(2)), None);
+    }
+
+    #[test]
+    fn a_slit_of_one_edge_encloses_nothing() {
+        let whole = test_surfaces::grid(4, 4, [1.0, 1.0], 0.0);
+        let inner = |h: &HalfedgeId| [whole.from(*h), whole.to(*h)].iter().all(|&v| !whole.is_boundary_vertex(v));
+        let h = whole.edges().find(inner).expect("an inner edge");
+        // Both its ends are doubled, too, as in a surface that is severed there and nowhere else.
+        let twin =
+            whole.halfedges().map(|g| if [h, whole.twin(h)].contains(&g) { HalfedgeId::NONE } else { whole.twin(g) });
+        let corners: Vec<u32> = whole.triangles().iter().flatten().map(|v| v.index() as u32).collect();
+        let slit = TriMesh::from_glued(&corners, twin.collect(), |source| whole.positions()[source as usize]).0;
+        assert!(doubled_edge(&slit).is_some());
+        assert_eq!(enclosed_vertex(&slit), None);
     }
 }

@@ -54,10 +54,10 @@ pub(super) fn foldover_free(
     let collapsed = |uv: &[Point2<f64>]| mesh.faces().filter(|&f| is_collapsed(mesh, rest, uv, f)).count();
     while !clearing.is_done() {
         if patience.ends(collapsed(&clearing.uv)) || !clearing.round(&[], progress)? {
-            return Ok(None);
+            break;
         }
     }
-    Ok(Some(clearing.uv))
+    Ok(first_flip(mesh, &clearing.uv).is_none().then_some(clearing.uv))
 }
 
 /// Whether a triangle is flipped or so nearly collapsed that Newton's steps would end there.
@@ -84,16 +84,19 @@ pub(super) fn foldover_free_near(
             return Ok(first_flip(mesh, &uv).is_none().then_some(uv));
         }
         if patience.ends(count) {
-            return Ok(None);
+            break;
         }
         let near = Neighbourhood::new(mesh, rest, &bad, rings);
         let mut clearing = Clearing::new(&near.mesh, &near.rest, near.read(&uv), COLLAPSED, epsilon)?;
-        if !clearing.round(&near.pinned, progress)? {
-            return Ok(None);
-        }
-        epsilon = clearing.energy.epsilon;
+        let goes_on = clearing.round(&near.pinned, progress)?;
         near.write(&clearing.uv, &mut uv);
+        epsilon = clearing.energy.epsilon;
+        if !goes_on {
+            break;
+        }
     }
+    // Some may be all but collapsed still.
+    Ok(first_flip(mesh, &uv).is_none().then_some(uv))
 }
 
 /// When to give up.
@@ -204,6 +207,38 @@ mod tests {
         clears(&mesh, &folded);
         let mirrored: Vec<_> = mesh.positions().iter().map(|p| Point2::new(-p.x, p.y)).collect();
         clears(&mesh, &mirrored);
+    }
+
+    #[test]
+    fn patience_ends_where_flips_rise_or_stay() {
+        let rounds = |counts: &[usize]| {
+            let mut patience = Patience::default();
+            counts.iter().position(|&count| patience.ends(count))
+        };
+        assert_eq!(rounds(&[20, 16, 9, 5, 2, 2, 2]), Some(6), "stays, asked every other round");
+        assert_eq!(rounds(&[20, 40, 15, 30, 9, 8, 7]), None);
+        assert_eq!(rounds(&[20, 61]), Some(1), "rises");
+        assert_eq!(rounds(&[2, 14, 1]), None, "a few more are forgiven");
+        assert_eq!(rounds(&[900, 800, 700, 500, 400, 300, 200, 150, 100]), Some(MOST_ROUNDS));
+    }
+
+    #[test]
+    fn near_a_fold_only_its_neighbourhood_moves_and_collapsed_is_not_flipped() {
+        let mesh = grid(30, 8, |x, y| Point3::new(x, y, 0.0));
+        let rest = RestTriangle::of_mesh(&mesh);
+        let flat: Vec<_> = mesh.positions().iter().map(|p| p.xy()).collect();
+        let at = |x: f64, y: f64| flat.iter().position(|p| *p == Point2::new(x, y)).expect("a vertex");
+        let mut folded = flat.clone();
+        folded[at(6.0, 4.0)].x += 1.7;
+        assert!(first_flip(&mesh, &folded).is_some());
+        let near = foldover_free_near(&mesh, &rest, &folded, 3, &Progress::new()).expect("solver").expect("cleared");
+        assert_eq!(first_flip(&mesh, &near), None);
+        assert!(flat.iter().zip(&near).all(|(p, q)| p.x < 13.0 || p == q));
+        // Held by so narrow a neighbourhood that nothing moves, a triangle without a flip is no failure.
+        let mut thin = flat.clone();
+        thin[at(6.0, 4.0)].x += 0.99;
+        let kept = foldover_free_near(&mesh, &rest, &thin, 0, &Progress::new()).expect("solver").expect("no flip");
+        assert_eq!(first_flip(&mesh, &kept), None);
     }
 
     #[test]

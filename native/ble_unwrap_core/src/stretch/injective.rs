@@ -14,8 +14,8 @@ use crate::progress::Progress;
 
 /// Up to this share of flipped triangles, and always if they are no more than
 const FEW_FLIPS: f64 = 0.1;
-/// so many, they are cleared in their neighbourhoods of so many rings, and else all vertices are moved. Those that resist in
-/// their neighbourhoods resist there, too,
+/// so many, they are cleared in their neighbourhoods of so many rings (else all vertices move, which clears hardly one that
+/// resists in its neighbourhood),
 const ALWAYS_FEW: usize = 8;
 /// the second only where the first was too narrow.
 const NEIGHBOURHOODS: [usize; 2] = [3, 8];

@@ -18,7 +18,7 @@ pub(super) struct Laplacian {
 }
 
 impl Laplacian {
-    /// With solutions that are what the right-hand side is at held vertices, which are nothing to the others. O(n^1.5).
+    /// Held vertices keep their right-hand side and do not act on the others, as if it were zero. O(n^1.5).
     ///
     /// # Errors
     /// [`SparseError`] where the system cannot be factored.
@@ -42,6 +42,9 @@ impl Laplacian {
         for h in mesh.edges() {
             let w = weight(h) + if mesh.is_boundary(h) { 0.0 } else { weight(mesh.twin(h)) };
             let [i, j] = ends(h);
+            if i == j {
+                continue;
+            }
             for v in [i, j].into_iter().filter(|&v| is_free[v]) {
                 values[solver.pattern().diagonal(v)] += w * (1.0 + RIDGE);
             }
