@@ -35,7 +35,7 @@ static ROWS: [Row; 17] = [
     row("capped cylinder", [1, 1], 1.06, 1.90, 0.49),
     row("cone", [1, 1], 1.000_001, 0.85, 0.54),
     row("torus", [1, 1], 1.04, 1.89, 0.39),
-    row("plate with five holes", [1, 1], 1.06, 4.10, 0.30),
+    row("plate with five holes", [2, 2], 1.06, 4.45, 0.60),
     row("Moebius strip", [2, 2], 1.001, 0.64, 0.52),
     row("Klein bottle", [1, 1], 1.04, 1.90, 0.55),
     row("face", [1, 1], 1.04, 0.0, 0.73),
