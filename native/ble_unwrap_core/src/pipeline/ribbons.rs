@@ -19,7 +19,9 @@ use super::rungs::{Rung, Rungs};
 
 /// A chart is cut if a texture that holds it, whatever its turn, can be filled to no more than this share by all charts, or
 const LEAST_FILL: f64 = 0.25;
-/// than this if it is a body that was cut open, with seams all round: there one more shows less than across a plank.
+/// than this if it is a body that was cut open, with seams all round: there one more shows less than across a plank. Over 16
+/// models 0.25, 0.4 and 0.5 give 3.18, 3.36 and 3.78 charts, seams of 3.20, 3.24 and 3.36 (geometric means), and fill 0.546,
+/// 0.567 and 0.584 of the texture.
 const LEAST_FILL_OF_BODIES: f64 = 0.4;
 /// Share of its boundary along which such a body borders on itself.
 const LEAST_SELF_BORDER: f64 = 0.5;
