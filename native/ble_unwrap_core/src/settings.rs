@@ -147,6 +147,12 @@ impl Settings {
 }
 
 impl Settings {
+    /// Whether charts may be cut open by darts, to nets, or have polygons handed over their borders: [`Settings::least_sewn`]
+    /// is below [`NEVER_SEWN`].
+    pub(crate) fn wants_darts(&self) -> bool {
+        self.least_sewn < NEVER_SEWN
+    }
+
     /// The L2 stretch that a single chart may have: the limit, or where that is over the atlas 1 and four times what the
     /// limit is above 1.
     #[must_use]

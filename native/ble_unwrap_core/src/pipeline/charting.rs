@@ -12,10 +12,11 @@ use crate::geodesics::LandmarkDistances;
 use crate::mesh::{FaceId, Topology, VertexId};
 use crate::progress::Cancelled;
 use crate::segmentation::{self, Segmentation, SpectralAnalysis};
-use crate::settings::{Holes, NEVER_SEWN, Settings};
+use crate::settings::{Holes, Settings};
 
 use super::flatten::{self, Flattened, Positions};
 use super::memo::{Fingerprint, Kind, Run};
+use super::polygon;
 use super::relief::{self, Relief};
 use super::rungs::{Rung, Rungs};
 
@@ -256,7 +257,7 @@ impl<'a> Attempt<'a> {
     fn polygon(&self, rungs: &mut Rungs) -> Result<Chart, Cancelled> {
         let flat = match flatten::isometric(self.patch, rungs) {
             Some(flat) => flat,
-            None => flatten::flatten_polygon(self.patch, &self.analysis()?.0, self.settings, rungs, self.progress)?,
+            None => polygon::flatten(self.patch, &self.analysis()?.0, self.settings, rungs, self.progress)?,
         };
         Ok(flat.into_chart(self.patch.clone()))
     }
@@ -336,16 +337,12 @@ impl<'a> Attempt<'a> {
 
     /// What darts may do for a patch; `None` if none are wanted.
     fn relief<'p>(&'p self, patch: Cow<'p, Patch>) -> Option<Relief<'p>> {
-        if self.wants_darts() { Relief::of(patch, self.settings.stretch_limit, self.progress) } else { None }
-    }
-
-    fn wants_darts(&self) -> bool {
-        self.settings.least_sewn < NEVER_SEWN
+        if self.settings.wants_darts() { Relief::of(patch, self.settings.stretch_limit, self.progress) } else { None }
     }
 
     /// A box or the like, unfolded.
     fn net(&self, rungs: &mut Rungs) -> Option<Chart> {
-        let net = if self.wants_darts() { relief::net(self.patch)? } else { return None };
+        let net = if self.settings.wants_darts() { relief::net(self.patch)? } else { return None };
         let flat = flatten::isometric(&net, rungs)?;
         rungs.take(Rung::Dart);
         Some(flat.into_chart(net))

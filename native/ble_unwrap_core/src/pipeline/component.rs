@@ -14,7 +14,7 @@ use crate::charts::{Chart, Patch};
 use crate::mesh::{self, Coarse, FaceId, Groups, HalfedgeId, TriMesh};
 use crate::progress::Cancelled;
 use crate::segmentation::{self, Segmentation};
-use crate::settings::{NEVER_SEWN, Settings};
+use crate::settings::Settings;
 
 use super::carry::carried_over;
 use super::charting::{self, Charting};
@@ -339,7 +339,7 @@ impl<'a> OnCoarse<'a> {
 
     /// A patch and its start, cut open where two edges join the same vertices, as far as the coarse chart was not.
     fn opened(&self, patch: Patch, start: Positions) -> (Patch, Positions) {
-        if self.settings.least_sewn < NEVER_SEWN { relief::without_doubled_edges(patch, start) } else { (patch, start) }
+        if self.settings.wants_darts() { relief::without_doubled_edges(patch, start) } else { (patch, start) }
     }
 
     fn step(&self, part: &Part, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Outcome, Cancelled> {

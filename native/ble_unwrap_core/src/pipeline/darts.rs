@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::charts::{Chart, Patch};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::progress::Cancelled;
-use crate::settings::{NEVER_SEWN, Settings};
+use crate::settings::Settings;
 
 use super::flatten::{self, Polished};
 use super::memo;
@@ -61,7 +61,7 @@ pub(super) fn sew(
     progress: &memo::Run<'_>,
 ) -> Result<(Vec<Sewn>, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
-    let is_wanted = settings.merge && settings.least_sewn < NEVER_SEWN;
+    let is_wanted = settings.merge && settings.wants_darts();
     let whole = |(i, chart)| Some(Piece::new(Sewn { chart, pieces: vec![i], edges: Vec::new() }));
     let pool: Vec<Option<Piece>> = charts.into_iter().enumerate().map(whole).collect();
     let mut table =
@@ -310,6 +310,7 @@ mod tests {
     use crate::mesh::test_surfaces;
     use crate::pipeline::carry::carried_over;
     use crate::pipeline::charting;
+    use crate::settings::NEVER_SEWN;
     use crate::stretch;
     use nalgebra::Point3;
 

@@ -19,7 +19,7 @@ use crate::verify::{self, Certificate};
 
 use super::memo::Run;
 use super::rungs::{Rung, Rungs};
-use super::{Atlas, Clock, charting, flatten};
+use super::{Atlas, Clock, charting, flatten, polygon};
 
 /// Rounds of packing, checking and mending. Needles that rounding breaks are gone after one; the rest
 /// is for charts whose parts break again.
@@ -280,7 +280,7 @@ fn mend(
         }
         if chart.patch.is_one_polygon() {
             rungs.take(Rung::Thicken);
-            kept.push(flatten::thicken_polygon(&chart.patch, faults.round > 2).into_chart(chart.patch));
+            kept.push(polygon::thicken(&chart.patch, faults.round > 2).into_chart(chart.patch));
             continue;
         }
         if broken.is_empty()

@@ -1,7 +1,5 @@
 //! One patch to one chart: the fallback ladder from a plane to Tutte.
 
-use std::f64::consts::TAU;
-
 use nalgebra::Point2;
 
 use crate::charts::{Chart, Patch};
@@ -56,8 +54,8 @@ const NEAR: f64 = 1.25;
 
 /// A patch flattened without flips and without overlap.
 pub(super) struct Flat {
-    uv: Vec<Point2<f64>>,
-    l2: f64,
+    pub(super) uv: Positions,
+    pub(super) l2: f64,
 }
 
 impl Flat {
@@ -98,7 +96,7 @@ fn isometric_of(patch: &Patch, rest: &[RestTriangle], rungs: &mut Rungs) -> Opti
 }
 
 /// L2 stretch of the surface as it is; of the thickened rest triangles where it has no area.
-fn l2(patch: &Patch, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
+pub(super) fn l2(patch: &Patch, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
     let true_l2 = stretch::l2_of_positions(&patch.mesh, uv, NEGLIGIBLE);
     if true_l2.is_nan() { stretch::l2_stretch(&patch.mesh, rest, uv) } else { true_l2 }
 }
@@ -114,6 +112,17 @@ pub(super) fn flatten(
 ) -> Result<Flattened, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
     recover(trial.flatten(distances, Some(settings.stretch_limit), rungs), Flattened::Refused)
+}
+
+/// The same whatever the stretch.
+pub(super) fn without_limit(
+    patch: &Patch,
+    distances: &LandmarkDistances,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Run<'_>,
+) -> Result<Flattened, Cancelled> {
+    recover(Trial::new(patch, settings, progress).flatten(distances, None, rungs), Flattened::Refused)
 }
 
 /// Flattens a patch of genus 0 with a boundary from its projection, if it leans so little from its mean plane that this
@@ -217,23 +226,6 @@ pub(super) fn part_of_chart(
     })
 }
 
-/// Flattens a patch that is one polygon, which cannot be split: as well as it goes, and at worst on a
-/// circle, where every triangulation of a polygon is free of flips.
-pub(super) fn flatten_polygon(
-    patch: &Patch,
-    distances: &LandmarkDistances,
-    settings: &Settings,
-    rungs: &mut Rungs,
-    progress: &Run<'_>,
-) -> Result<Flat, Cancelled> {
-    let trial = Trial::new(patch, settings, progress);
-    if let Flattened::Flat(flat) = recover(trial.flatten(distances, None, rungs), Flattened::Refused)? {
-        return Ok(flat);
-    }
-    rungs.take(Rung::TutteCircle);
-    Ok(on_a_circle(patch))
-}
-
 /// Flattens a chart's patch anew so that its boundary keeps its distance from itself: from Tutte's
 /// embedding, under the barrier. `None` where that is over the limit.
 pub(super) fn flatten_apart(
@@ -244,37 +236,6 @@ pub(super) fn flatten_apart(
 ) -> Result<Option<Flat>, Cancelled> {
     let trial = Trial::new(patch, settings, progress);
     recover(trial.flatten_apart(Some(settings.stretch_limit), rungs), None)
-}
-
-/// A patch that is one polygon, too thin or too small for single precision: a triangle at least a
-/// thousandth as high as long, and if that was not enough or for more corners a regular polygon.
-/// Whatever the polygon, no triangle of it is close to degenerate.
-pub(super) fn thicken_polygon(patch: &Patch, was_not_enough: bool) -> Flat {
-    if patch.mesh.face_count() > 1 || was_not_enough {
-        return on_a_circle(patch);
-    }
-    let rest = RestTriangle::of_mesh(&patch.mesh);
-    let mut uv = vec![Point2::origin(); patch.mesh.vertex_count()];
-    for (f, r) in patch.mesh.faces().zip(&rest) {
-        for (v, p) in patch.mesh.triangle(f).iter().zip(r.corners()) {
-            uv[v.index()] = p;
-        }
-    }
-    Flat { l2: l2(patch, &rest, &uv), uv }
-}
-
-/// A triangulated polygon with its corners evenly on a circle: strictly convex, so no triangle is
-/// flipped or degenerate.
-fn on_a_circle(patch: &Patch) -> Flat {
-    let loops = patch.mesh.boundary_loops();
-    let mut uv = vec![Point2::origin(); patch.mesh.vertex_count()];
-    for corners in loops.iter().take(1) {
-        for (i, h) in corners.iter().enumerate() {
-            let angle = TAU * i as f64 / corners.len() as f64;
-            uv[patch.mesh.from(*h).index()] = Point2::new(angle.cos(), angle.sin());
-        }
-    }
-    Flat { l2: l2(patch, &RestTriangle::of_mesh(&patch.mesh), &uv), uv }
 }
 
 /// What became of a chart whose boundary was free.

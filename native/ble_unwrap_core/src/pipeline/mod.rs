@@ -15,6 +15,7 @@ mod finish;
 mod flatten;
 mod memo;
 mod merge;
+mod polygon;
 mod prolong;
 mod recut;
 mod relief;

@@ -13,7 +13,7 @@ use crate::charts::{Chart, Patch};
 use crate::distortion::{self, RestTriangle};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::{Cancelled, Progress};
-use crate::settings::{Holes, NEVER_SEWN, Settings};
+use crate::settings::{Holes, Settings};
 use crate::stretch;
 
 use super::flatten::{self, NEGLIGIBLE};
@@ -47,7 +47,7 @@ pub(super) fn recut(
     rungs: &mut Rungs,
     progress: &Progress,
 ) -> Result<Vec<Chart>, Cancelled> {
-    if !settings.merge || settings.least_sewn >= NEVER_SEWN {
+    if !settings.merge || !settings.wants_darts() {
         return Ok(charts);
     }
     let unit = mesh.halfedges().map(|h| mesh.edge_length(h)).sum::<f64>() / mesh.halfedge_count().max(1) as f64;
@@ -311,6 +311,7 @@ fn is_in(faces: &[FaceId], face: FaceId) -> bool {
 mod tests {
     use super::*;
     use crate::mesh::test_surfaces;
+    use crate::settings::NEVER_SEWN;
     use nalgebra::{Point3, Vector3};
 
     /// Positions along x and y of a vertex in the plane.

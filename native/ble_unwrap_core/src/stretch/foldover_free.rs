@@ -51,9 +51,8 @@ pub(super) fn foldover_free(
 ) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
     let mut patience = Patience::default();
     let mut clearing = Clearing::new(mesh, rest, start.to_vec(), 0.0, WIDE)?;
-    let collapsed = |uv: &[Point2<f64>]| mesh.faces().filter(|&f| is_collapsed(mesh, rest, uv, f)).count();
     while !clearing.is_done() {
-        if patience.ends(collapsed(&clearing.uv)) || !clearing.round(&[], progress)? {
+        if patience.ends(collapsed(mesh, rest, &clearing.uv)) || !clearing.round(&[], progress)? {
             break;
         }
     }
@@ -63,6 +62,11 @@ pub(super) fn foldover_free(
 /// Whether a triangle is flipped or so nearly collapsed that Newton's steps would end there.
 pub(super) fn is_collapsed(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>], f: FaceId) -> bool {
     rest[f.index()].jacobian(mesh.triangle(f).map(|v| uv[v.index()])).determinant() < COLLAPSED
+}
+
+/// Number of such triangles.
+pub(super) fn collapsed(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> usize {
+    mesh.faces().filter(|&f| is_collapsed(mesh, rest, uv, f)).count()
 }
 
 /// As [`foldover_free`], but only vertices near flipped or collapsed triangles move: all whose triangles are fewer than

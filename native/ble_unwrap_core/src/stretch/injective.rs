@@ -3,7 +3,7 @@
 use nalgebra::Point2;
 
 use super::StretchError;
-use super::foldover_free::{foldover_free, foldover_free_near, is_collapsed};
+use super::foldover_free::{collapsed, foldover_free, foldover_free_near, is_collapsed};
 use super::measure::{plane_area, rescale_to_equal_area};
 use super::neighbourhood::Neighbourhood;
 use super::overlap::first_flip;
@@ -142,11 +142,6 @@ pub fn clear_locally(
         }
     }
     Ok(None)
-}
-
-/// Number of flipped or collapsed triangles.
-fn collapsed(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> usize {
-    mesh.faces().filter(|&f| is_collapsed(mesh, rest, uv, f)).count()
 }
 
 fn are_few(count: usize, mesh: &TriMesh) -> bool {
