@@ -20,11 +20,14 @@
 //! stage follows it, its documentation names section and equation.
 #![forbid(unsafe_code)]
 
+mod atlas;
 pub mod charts;
+mod clock;
 pub mod cloud;
 pub mod distortion;
 pub mod embedding;
 mod error;
+pub mod flattening;
 pub mod geodesics;
 pub mod linalg;
 pub mod mesh;
@@ -40,10 +43,12 @@ pub mod standalone;
 pub mod stretch;
 mod verify;
 
+pub use atlas::Atlas;
 pub use cloud::{CloudError, CloudReport, PointAtlas, unwrap_points};
 pub use error::UnwrapError;
+pub use flattening::{Rung, Rungs};
 pub use mesh::{MeshError, MeshInput};
-pub use pipeline::{Analysis, Atlas, Rung, Rungs, unwrap};
+pub use pipeline::{Analysis, unwrap};
 pub use progress::{Cancelled, Progress, Stage};
 pub use report::Report;
 pub use settings::{ChartScale, Holes, LimitOver, NEVER_SEWN, Settings};

@@ -92,8 +92,8 @@ impl Report {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Progress;
     use crate::metrics::{Texture, UvMesh, measure};
+    use crate::progress::Progress;
     use nalgebra::Point3;
 
     #[test]

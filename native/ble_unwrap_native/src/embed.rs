@@ -12,7 +12,7 @@ use crate::errors::{Failure, InvalidArgumentError};
 use crate::job::Job;
 use crate::owned_array::Array;
 use crate::settings::{self, Call, Function};
-use crate::words::Words;
+use crate::words::{Words, words};
 
 /// Points in few dimensions, and how they were found.
 ///
@@ -105,6 +105,8 @@ pub(crate) enum DataKind {
     Affinities,
 }
 
+words!(DataKind { "points" => Points, "distances" => Distances, "affinities" => Affinities });
+
 /// How far apart points are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PointDistance {
@@ -113,6 +115,8 @@ pub(crate) enum PointDistance {
     /// Along the graph of nearest neighbours.
     Geodesic,
 }
+
+words!(PointDistance { "euclidean" => Euclidean, "geodesic" => Geodesic });
 
 /// Points can span no more dimensions than there are of them, and their n² distances must fit in memory.
 const MOST_DIMENSIONS: usize = 100_000;

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyString};
 
 use crate::errors::InvalidArgumentError;
-use crate::words::Words;
+use crate::words::{Words, words};
 
 /// What the keywords of one call amount to.
 #[derive(Clone, Debug)]
@@ -39,6 +39,8 @@ pub(crate) enum Preset {
     /// The same with Isomap, which the paper compares itself with.
     IsoCharts,
 }
+
+words!(Preset { "default" => Default, "paper" => Paper, "iso_charts" => IsoCharts });
 
 /// The functions that take settings. A setting that a function has no use for is an error there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,9 +7,6 @@ use ble_unwrap_core::standalone::Connect;
 use ble_unwrap_core::stretch::Solver;
 use ble_unwrap_core::{ChartScale, Holes, LimitOver};
 
-use crate::embed::{DataKind, PointDistance};
-use crate::settings::Preset;
-
 /// A choice that has a word for each of its values.
 pub(crate) trait Words {
     /// All words, the usual one first.
@@ -20,9 +17,10 @@ pub(crate) trait Words {
     fn set(&mut self, word: &str) -> bool;
 }
 
+/// Gives the values of a choice their words, the usual one first.
 macro_rules! words {
     ($choice:ty { $($word:literal => $value:ident),+ $(,)? }) => {
-        impl Words for $choice {
+        impl $crate::words::Words for $choice {
             fn words(&self) -> Vec<&'static str> {
                 vec![$($word),+]
             }
@@ -44,10 +42,9 @@ macro_rules! words {
     };
 }
 
-words!(DataKind { "points" => Points, "distances" => Distances, "affinities" => Affinities });
+pub(crate) use words;
+
 words!(Evidence { "distances" => SquaredDistances, "affinities" => Affinities });
-words!(PointDistance { "euclidean" => Euclidean, "geodesic" => Geodesic });
-words!(Preset { "default" => Default, "paper" => Paper, "iso_charts" => IsoCharts });
 words!(Holes { "keep" => Keep, "cut" => Cut });
 words!(ChartScale { "uniform" => Uniform, "stretch" => Stretch });
 words!(LimitOver { "chart" => Chart, "atlas" => Atlas });

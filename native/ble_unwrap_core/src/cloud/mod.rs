@@ -46,7 +46,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nalgebra::Point2;
 use rayon::prelude::*;
 
-use crate::pipeline::Clock;
+use crate::clock::Clock;
 use crate::progress::{Cancelled, Progress, Stage};
 use crate::settings::Settings;
 

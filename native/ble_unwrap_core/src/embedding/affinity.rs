@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::Progress;
+use crate::progress::Progress;
 
 use super::EmbeddingError;
 use super::logistic::{logistic, logistic_pair};

@@ -21,8 +21,8 @@
 
 use rayon::prelude::*;
 
-use crate::Progress;
 use crate::progress::Cancelled;
+use crate::progress::Progress;
 
 use super::EmbeddingError;
 use super::affinity::Affinity;

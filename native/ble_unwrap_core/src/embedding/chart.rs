@@ -3,10 +3,10 @@
 use nalgebra::Point2;
 use rayon::prelude::*;
 
-use crate::Progress;
 use crate::geodesics::LandmarkDistances;
 use crate::linalg::{EigenError, Mds, leading_mds};
 use crate::mesh::VertexId;
+use crate::progress::Progress;
 
 use super::affinity::{Affinity, KernelWidth, kernel_width};
 use super::bernoulli_logistic::fit;

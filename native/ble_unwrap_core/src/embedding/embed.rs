@@ -8,12 +8,13 @@
 //!
 //! [`Model::Isomap`] takes the same distances and stops at classical scaling.
 
-use crate::Progress;
 use crate::linalg::leading_mds;
+use crate::progress::Progress;
 
 use super::affinity::{Affinity, Kernel, KernelWidth, squared_distances};
 use super::bernoulli_logistic::fit;
 use super::chart::{mds_start, random_start};
+use super::embedded::Embedding;
 use super::error::EmbeddingError;
 use super::input::EmbedInput;
 use super::landmark_regression::{Evidence, LandmarkModel};
@@ -44,35 +45,6 @@ impl Default for EmbedOptions<'_> {
     fn default() -> Self {
         Self { dimensions: 2, width: None, truncation: 0.0, landmarks: None, start: None, seed: 0 }
     }
-}
-
-/// Points in few dimensions, how they were found, and what places further points among them.
-#[derive(Clone, Debug)]
-pub struct Embedding {
-    /// Number of dimensions q.
-    pub dimensions: usize,
-    /// The n×q coordinates, row by row. Times √σ they are in units of distance (Isomap, with σ = 1, and the default model;
-    /// the printed model has no scale). Rotation, reflection and, but for the printed model, place are arbitrary.
-    pub coordinates: Vec<f64>,
-    /// The n intercepts of the default model; empty for the others.
-    pub intercepts: Vec<f64>,
-    /// The kernel width σ, in units of squared distance; 1 for affinities and for Isomap.
-    pub sigma: f64,
-    /// Mean affinity over all pairs that were fitted together; `None` for Isomap.
-    pub mean_affinity: Option<f64>,
-    /// Log-likelihood (4) of the points that were fitted together; `None` for Isomap.
-    pub log_likelihood: Option<f64>,
-    /// The log-likelihood at the start and after each sweep that was kept; empty for Isomap.
-    pub trace: Vec<f64>,
-    /// Bregman distance (12) of the affinities from the model; `None` for Isomap.
-    pub bregman: Option<f64>,
-    /// Sweeps made; 0 for Isomap.
-    pub sweeps: usize,
-    /// Whether the likelihood settled before the sweeps ran out; true for Isomap.
-    pub converged: bool,
-    /// The points that were fitted together, in farthest-point order; all in their own order without landmarks.
-    pub landmarks: Vec<usize>,
-    pub(super) placement: Placement,
 }
 
 /// Landmarks that a truncated fit takes its start, and where need be σ, from.

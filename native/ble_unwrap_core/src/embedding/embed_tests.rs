@@ -10,8 +10,8 @@ use super::flat_shapes::{disc, ell, misfit, rectangle};
 use super::input::{EmbedInput, PointMetric};
 use super::random::normal;
 use super::settings::{EmbeddingSettings, Initial, Model};
-use crate::Progress;
 use crate::linalg::classical_mds;
+use crate::progress::Progress;
 
 const GEODESIC: PointMetric = PointMetric::Geodesic { neighbours: 8 };
 

@@ -6,11 +6,11 @@
 use nalgebra::Point2;
 use rayon::prelude::*;
 
-use crate::Progress;
 use crate::geodesics::LandmarkDistances;
 use crate::linalg::Mds;
 use crate::mesh::VertexId;
 use crate::progress::Cancelled;
+use crate::progress::Progress;
 
 /// Places every vertex in the plane of the first two coordinates of its landmarks' scaling, in units of
 /// distance. Deterministic, O(kn).

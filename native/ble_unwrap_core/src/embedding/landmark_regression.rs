@@ -10,10 +10,10 @@
 
 use rayon::prelude::*;
 
-use crate::Progress;
 use crate::geodesics::LandmarkDistances;
 use crate::mesh::VertexId;
 use crate::progress::Cancelled;
+use crate::progress::Progress;
 
 use super::affinity::{Kernel, log_odds};
 use super::blocks::{planar_solve, solve};

@@ -3,9 +3,9 @@
 use super::affinity::Kernel;
 use super::landmark_regression::{Evidence, LandmarkModel};
 use super::random::normal;
-use crate::Progress;
 use crate::geodesics::LandmarkDistances;
 use crate::mesh::VertexId;
+use crate::progress::Progress;
 
 /// k landmarks of q dimensions with exact parameters of the model with intercepts, σ = 1.
 fn exact(k: usize, q: usize) -> (LandmarkModel, Vec<Vec<f64>>) {

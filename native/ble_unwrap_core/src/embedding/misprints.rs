@@ -9,7 +9,7 @@ use super::bernoulli_logistic::{Fit, FitOptions, LogitModel, Update, fit};
 use super::blocks::{Blocks, General};
 use super::logistic::Quarter;
 use super::random::normal;
-use crate::Progress;
+use crate::progress::Progress;
 
 /// Affinities of all ordered pairs, not symmetric, and q-dimensional points of the printed model.
 #[derive(Clone)]

@@ -2,12 +2,11 @@
 
 use rayon::prelude::*;
 
-use crate::Progress;
 use crate::linalg::Mds;
 use crate::progress::Cancelled;
+use crate::progress::Progress;
 
 use super::affinity::{Kernel, KernelWidth};
-use super::embed::Embedding;
 use super::error::EmbeddingError;
 use super::input::{check_affinities, check_distances, check_points};
 use super::landmark_regression::{Evidence, LandmarkModel};
@@ -59,14 +58,14 @@ impl Placer {
     }
 }
 
-/// Landmarks as plain arrays, which outlive the [`Embedding`] that they come from.
+/// Landmarks as plain arrays, which outlive the [`Embedding`](super::Embedding) that they come from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FittedLandmarks<'a> {
     /// The model.
     pub model: Model,
     /// Number of dimensions q ≥ 1.
     pub dimensions: usize,
-    /// The k×q coordinates, row by row, in the unit of [`Embedding::coordinates`].
+    /// The k×q coordinates, row by row, in the unit of [`Embedding::coordinates`](super::Embedding::coordinates).
     pub coordinates: &'a [f64],
     /// The k intercepts of the default model; empty for the others.
     pub intercepts: &'a [f64],
@@ -119,7 +118,7 @@ impl FittedLandmarks<'_> {
 }
 
 /// Places `m` points by their distances (not squared) or affinities to k landmarks: m×q coordinates, row by row, as
-/// [`Embedding::transform`] does, which has the landmarks from the fit.
+/// [`Embedding::transform`](super::Embedding::transform) does, which has the landmarks from the fit.
 ///
 /// Deterministic for any number of threads. O(kq²) a point.
 ///
@@ -187,57 +186,5 @@ impl Placement {
             all_intercepts.clear();
         }
         Ok((all, all_intercepts))
-    }
-}
-
-impl Embedding {
-    /// What one row of new data must hold: p coordinates for points, else k distances or affinities to the
-    /// [`landmarks`](Embedding::landmarks), in their order.
-    #[must_use]
-    pub fn columns(&self) -> usize {
-        self.placement.reference.columns()
-    }
-
-    /// Places `m` new points: m×q coordinates, row by row, in the frame of the embedding.
-    ///
-    /// `data` holds m rows of `columns` values of the kind that was embedded: points, or distances or affinities to the
-    /// k fitted points. Each new point is placed by itself, as points that are no landmarks are: the maximum of its
-    /// likelihood given the fitted points (for Isomap landmark scaling). A geodesic distance leads over the fitted points
-    /// nearest to it, as many as the graph has neighbours. A fitted point, at distance 0 from itself, comes out
-    /// where it is; by affinities, which do not tell that, nearly so.
-    /// Deterministic for any number of threads. O(kq²) a point, and to find the nearest O(np) along a graph.
-    ///
-    /// # Errors
-    /// [`EmbeddingError::WrongColumns`]; [`EmbeddingError::WrongLength`] unless there are m·columns values; the first bad
-    /// value as [`embed()`](super::embed()) names it, rows being new points; cancelled.
-    pub fn transform(
-        &self,
-        data: &[f64],
-        m: usize,
-        columns: usize,
-        progress: &Progress,
-    ) -> Result<Vec<f64>, EmbeddingError> {
-        let reference = &self.placement.reference;
-        let expected = reference.columns();
-        if columns != expected {
-            let what = match reference {
-                Reference::Points { .. } | Reference::Graph { .. } => "coordinates a point",
-                Reference::Distances { .. } => "distances a point, to the points that were fitted",
-                Reference::Affinities { .. } => "affinities a point, to the points that were fitted",
-            };
-            return Err(EmbeddingError::WrongColumns { expected, what, found: columns });
-        }
-        if m.checked_mul(columns) != Some(data.len()) {
-            return Err(EmbeddingError::WrongLength { expected: m.saturating_mul(columns), found: data.len() });
-        }
-        // New rows are no square matrix: nothing is exempt as a diagonal.
-        match reference {
-            Reference::Points { .. } | Reference::Graph { .. } => check_points(data, m, columns)?,
-            Reference::Distances { .. } => check_distances(data, columns, 0)?,
-            Reference::Affinities { .. } => check_affinities(data, columns, 0)?,
-        }
-        let contacts = reference.contacts(data, progress)?;
-        let observe = |i: usize, row: &mut [f64]| reference.observe_new(data, &contacts, i, row);
-        Ok(self.placement.placer.place(m, self.dimensions, self.placement.evidence, observe, progress)?.0)
     }
 }

@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use crate::Progress;
 use crate::geodesics::{
     DijkstraScratch, WeightedGraph, connectivity, dijkstra, farthest_nodes, graph_distances, knn_graph, nearest_points,
 };
 use crate::progress::Cancelled;
+use crate::progress::Progress;
 
 use super::affinity::{Kernel, KernelWidth, kernel_width};
 use super::error::EmbeddingError;

@@ -5,9 +5,9 @@
 
 use rayon::prelude::*;
 
-use crate::Progress;
 use crate::geodesics::{DijkstraScratch, WeightedGraph, dijkstra_within};
 use crate::progress::Cancelled;
+use crate::progress::Progress;
 
 use super::affinity::{Affinity, Kernel};
 use super::error::EmbeddingError;

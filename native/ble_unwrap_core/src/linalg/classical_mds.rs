@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::krylov::{LANES, block_width, leading_of_operator, pays};
 use super::symmetric::{EigenError, Eigenpairs, leading_eigenpairs};
-use crate::Progress;
+use crate::progress::Progress;
 
 /// A coordinate is kept only where its eigenvalue exceeds this share of the largest: below it
 /// the double-centred matrix is rounding noise, and placement divides by the eigenvalue's root.

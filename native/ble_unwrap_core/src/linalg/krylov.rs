@@ -8,7 +8,7 @@
 //! Lanczos method for large symmetric eigenvalue problems, SIAM Journal on Matrix Analysis 22, 2000.
 
 use super::symmetric::{EigenError, Eigenpairs, leading_eigenpairs};
-use crate::Progress;
+use crate::progress::Progress;
 
 /// Vectors in a block beyond those asked for: they hold the next eigenvalues off and speed the wanted ones up.
 const GUARD: usize = 4;

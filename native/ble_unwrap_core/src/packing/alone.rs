@@ -2,9 +2,9 @@
 
 use nalgebra::Vector2;
 
-use super::density::{Dense, Place};
 use super::grid::Grid;
 use super::outline::Outline;
+use super::placement::{Dense, Place};
 use super::pose::turn_alone;
 use super::raster::rasterise;
 use super::shape::SAFETY_TEXELS;

@@ -6,13 +6,14 @@ use super::alone::alone;
 use super::grid::Grid;
 use super::mask::Reach;
 use super::outline::Outline;
+use super::placement::{Dense, Place};
 use super::pose::base_turns;
 use super::refine::Refinement;
 use super::search::{Best, Search};
 use super::shape::SAFETY_TEXELS;
 use super::sketch::{growth, most_promising};
-use super::{PackError, PackSettings, Pose, Quality, Rotation};
-use crate::Progress;
+use super::{PackError, PackSettings, Quality, Rotation};
+use crate::progress::Progress;
 
 /// So many of the largest charts are tried in more angles than one: about so many in all, at least and at
 /// most so many a chart. Quarter turns of each come for free.
@@ -30,26 +31,6 @@ const BEGINNINGS: [f64; 2] = [1.0, 0.9];
 const COARSENED: f64 = 0.3;
 /// Attempts of the search on the fine grid, where no sketch could be refined.
 const LAST_RESORT: usize = 10;
-
-/// Where a chart went.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
-    /// Chart plane to texels.
-    pub(super) pose: Pose,
-    /// Area of the cells it touches, in texels.
-    pub(super) touched: f64,
-    /// Whether it was scaled up to a texel.
-    pub(super) is_speck: bool,
-}
-
-/// A placement of all charts.
-#[derive(Clone, Debug)]
-pub(super) struct Dense {
-    /// By chart; `None` for charts without triangles.
-    pub(super) places: Vec<Option<Place>>,
-    /// Texels to a unit of the chart plane.
-    pub(super) density: f64,
-}
 
 /// One search on a coarse grid, and what is made of it.
 #[derive(Clone, Copy, Debug)]

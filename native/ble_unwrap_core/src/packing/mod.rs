@@ -36,12 +36,14 @@
 mod alone;
 mod cover;
 mod density;
+mod goal;
 mod grid;
 mod mask;
 mod occupancy;
 mod order;
 mod outline;
 mod place;
+mod placement;
 mod pose;
 mod raster;
 mod refine;
@@ -56,7 +58,7 @@ use nalgebra::{Point2, Vector2};
 use rayon::prelude::*;
 use thiserror::Error;
 
-use crate::{Cancelled, Progress};
+use crate::progress::{Cancelled, Progress};
 use outline::Outline;
 
 /// Which rotations a chart may take. It is never mirrored.

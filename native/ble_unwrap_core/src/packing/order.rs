@@ -1,6 +1,6 @@
 //! In which order and by which goal charts are placed: the part of packing that is searched.
 
-use super::place::Goal;
+use super::goal::Goal;
 use super::shape::Shape;
 
 /// A way to place all charts.

@@ -2,22 +2,12 @@
 
 use std::collections::HashMap;
 
+use super::goal::Goal;
 use super::mask::Reach;
 use super::occupancy::Occupancy;
 use super::order::Strategy;
 use super::shape::{Footprint, Shape};
-use crate::{Cancelled, Progress};
-
-/// What a position costs; all grow with x and with y.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Goal {
-    /// Least top, then least x.
-    Top,
-    /// Lowest centre of gravity, then least x.
-    Centre,
-    /// Least mean of the two.
-    Middle,
-}
+use crate::progress::{Cancelled, Progress};
 
 /// Where a shape went.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,20 +26,6 @@ pub(super) struct Layout {
     pub(super) rows: usize,
     /// Cells of shapes not placed.
     pub(super) missing: usize,
-}
-
-impl Goal {
-    #[inline]
-    fn cost(self, f: &Footprint, x: usize, y: usize) -> f64 {
-        let top = f.mask.height() as f64;
-        let above = match self {
-            Self::Top => top,
-            Self::Centre => f.centre_y,
-            Self::Middle => 0.5 * (top + f.centre_y),
-        };
-        // A row outweighs all columns.
-        (y as f64 + above) * (2 * Occupancy::WIDEST) as f64 + x as f64
-    }
 }
 
 /// Footprints that share the row where their search begins.

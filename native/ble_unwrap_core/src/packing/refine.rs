@@ -2,14 +2,14 @@
 
 use rayon::prelude::*;
 
-use super::density::{Dense, Place};
 use super::grid::Grid;
 use super::mask::Reach;
 use super::outline::Outline;
+use super::placement::{Dense, Place};
 use super::settle::{Ground, Piece, settle};
 use super::sketch::{Sketch, Spot};
 use super::{PackError, PackSettings};
-use crate::Progress;
+use crate::progress::Progress;
 
 /// Half the side of the windows charts are looked for in first, in cells of the sketch.
 const WINDOW: f64 = 1.0;

@@ -16,7 +16,7 @@ use super::outline::Outline;
 use super::place::{Layout, place};
 use super::shape::Shape;
 use super::sketch::Sketch;
-use crate::{Progress, Stage};
+use crate::progress::{Progress, Stage};
 
 /// Attempts in a round while the density is bracketed, when strategies are compared, and in each round
 /// of variations. They run in parallel; fixed, so that results do not depend on the number of threads.

@@ -9,7 +9,7 @@ use super::mask::{Mask, Reach};
 use super::outline::Outline;
 use super::raster::rasterise;
 use super::shape::{SAFETY_TEXELS, Scale};
-use crate::{Cancelled, Progress};
+use crate::progress::{Cancelled, Progress};
 
 /// What a cell to the right costs in rows when a place is chosen.
 const LEAN: f64 = 0.3;

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use crate::atlas::Atlas;
 use crate::charts::{Chart, Patch};
+use crate::clock::Clock;
 use crate::error::UnwrapError;
 use crate::mesh::{self, ConditionOptions, FaceId, Groups, MeshInput, Surface};
 use crate::packing::PackSettings;
@@ -13,9 +15,9 @@ use crate::progress::{Cancelled, Progress, Stage};
 use crate::settings::{ChartScale, LimitOver, Settings};
 
 use super::memo::{self, Fingerprint, Kind, Memo, Run};
-use super::rungs::Rungs;
 use super::tally::Tally;
-use super::{Atlas, Clock, budget, component, finish, ribbons};
+use super::{budget, component, finish, ribbons};
+use crate::flattening::Rungs;
 
 /// A mesh and what was found out about it, for unwrapping it several times with different settings.
 ///

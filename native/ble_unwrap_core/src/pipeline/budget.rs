@@ -11,8 +11,8 @@ use crate::progress::Cancelled;
 use crate::settings::Settings;
 
 use super::memo::Run;
-use super::rungs::{Rung, Rungs};
 use super::sew::{self, Joined};
+use crate::flattening::{Rung, Rungs};
 
 /// Share of the budget that is left for rounding to single precision.
 const RESERVE: f64 = 1e-4;

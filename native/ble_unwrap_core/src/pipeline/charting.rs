@@ -18,7 +18,7 @@ use super::flatten::{self, Flattened, Positions};
 use super::memo::{Fingerprint, Kind, Run};
 use super::polygon;
 use super::relief::{self, Relief};
-use super::rungs::{Rung, Rungs};
+use crate::flattening::{Rung, Rungs};
 
 /// Patches less planar than this are split before any flattening. Far below what the embedding alone would
 /// need (a cap of 100° has 0.79): stretch minimisation brings patches of 0.66 under an L2 of 1.1, and on

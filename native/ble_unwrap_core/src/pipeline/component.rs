@@ -25,8 +25,8 @@ use super::merge::{self, Which};
 use super::prolong::{Prolonged, prolong};
 use super::recut::recut;
 use super::relief;
-use super::rungs::{Rung, Rungs};
 use super::tally::Tally;
+use crate::flattening::{Rung, Rungs};
 
 /// Components of more vertices are charted on a coarse mesh.
 const COARSE_ABOVE: usize = 3_000;

@@ -17,7 +17,7 @@ use crate::settings::Settings;
 use super::flatten::{self, Polished};
 use super::memo;
 use super::rigid::{Motion, longest_fit};
-use super::rungs::{Rung, Rungs};
+use crate::flattening::{Rung, Rungs};
 
 /// Charts are sewn where their borders fit, by a rigid motion, up to this share (root of mean square over length) of the
 /// length that is sewn: a straight border and an arc of 120°. If that is over the limit, once more where they fit closer.
@@ -306,10 +306,10 @@ struct Run {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Progress;
     use crate::mesh::test_surfaces;
     use crate::pipeline::carry::carried_over;
     use crate::pipeline::charting;
+    use crate::progress::Progress;
     use crate::settings::NEVER_SEWN;
     use crate::stretch;
     use nalgebra::Point3;

@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Point2, Point3};
 
+use crate::atlas::Atlas;
 use crate::charts::{Chart, Patch};
+use crate::clock::Clock;
 use crate::distortion;
 use crate::error::UnwrapError;
 use crate::mesh::{self, FaceId, MeshInput, Surface, measure};
@@ -18,8 +20,8 @@ use crate::settings::{ChartScale, LimitOver, Settings};
 use crate::verify::{self, Certificate};
 
 use super::memo::Run;
-use super::rungs::{Rung, Rungs};
-use super::{Atlas, Clock, charting, flatten, polygon};
+use super::{charting, flatten, polygon};
+use crate::flattening::{Rung, Rungs};
 
 /// Rounds of packing, checking and mending. Needles that rounding breaks are gone after one; the rest
 /// is for charts whose parts break again.
@@ -85,7 +87,7 @@ pub(super) fn finish(
                 }
             }
             report.rungs = rungs.taken();
-            report.seconds = clock.laps;
+            report.seconds = clock.into_laps();
             progress.enter(Stage::Done);
             return Ok(Atlas { uv: layout.uv, chart: layout.polygon_chart, report });
         }

@@ -12,8 +12,8 @@ use crate::settings::Settings;
 use crate::stretch::{self, BOUNDARY_REACH, Minimised, StretchError};
 
 use super::memo::{Fingerprint, Kind, Run};
-use super::rungs::{Rung, Rungs};
-use super::steps::Steps;
+use crate::flattening::Steps;
+use crate::flattening::{Rung, Rungs};
 
 /// A chart is refused if one hundredth of its area is stretched by more than this: it would blur
 /// visibly there although its L2, an average, is fine.
@@ -523,8 +523,8 @@ fn recover<T>(result: Result<T, StretchError>, refused: T) -> Result<T, Cancelle
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Progress;
     use crate::mesh::test_surfaces;
+    use crate::progress::Progress;
     use crate::settings::LimitOver;
     use nalgebra::Point3;
 

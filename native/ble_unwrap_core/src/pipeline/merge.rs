@@ -13,8 +13,8 @@ use crate::settings::Settings;
 
 use super::charting::{self, Charting, Refused};
 use super::memo::Run;
-use super::rungs::{Rung, Rungs};
 use super::sew::{self, Joined};
+use crate::flattening::{Rung, Rungs};
 
 /// Failed unions a chart may take part in before it is left alone.
 const MOST_FAILURES: usize = 4;
@@ -268,8 +268,8 @@ fn independent_pairs(pool: &[Option<Candidate>], borders: &[(usize, usize, f64)]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Progress;
     use crate::mesh::test_surfaces;
+    use crate::progress::Progress;
     use crate::settings::NEVER_SEWN;
     use nalgebra::{Point2, Point3};
 

@@ -21,35 +21,19 @@ mod recut;
 mod relief;
 mod ribbons;
 mod rigid;
-mod rungs;
 mod sew;
-mod steps;
 mod tally;
 
-use std::time::Instant;
-
+use crate::atlas::Atlas;
+use crate::clock::Clock;
 use crate::error::UnwrapError;
 use crate::mesh::MeshInput;
 use crate::progress::{Progress, Stage};
-use crate::report::Report;
 use crate::settings::Settings;
 
 pub use analysis::Analysis;
 use analysis::Prepared;
 use memo::Run;
-pub use rungs::{Rung, Rungs};
-pub(crate) use steps::Steps;
-
-/// A UV for every corner of the input, and what is known about it.
-#[derive(Clone, Debug)]
-pub struct Atlas {
-    /// One UV a corner, in [0, 1]²; (0, 0) for the corners of unmapped faces.
-    pub uv: Vec<[f32; 2]>,
-    /// Chart of each input face, from 0; −1 for unmapped faces.
-    pub chart: Vec<i32>,
-    /// Measures of the result.
-    pub report: Report,
-}
 
 /// Unwraps a mesh: cuts it into charts, flattens them under the stretch limit, packs them.
 ///
@@ -75,26 +59,4 @@ pub fn unwrap(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -
     let prepared = Prepared::new(input, settings.weld, progress)?;
     clock.lap("condition");
     prepared.unwrap(input, settings, clock, &Run::new(progress, None))
-}
-
-/// Seconds of each stage, for the report; nothing is decided by them.
-pub(crate) struct Clock {
-    last: Instant,
-    laps: Vec<(&'static str, f64)>,
-}
-
-impl Clock {
-    pub(crate) fn new() -> Self {
-        Self { last: Instant::now(), laps: Vec::new() }
-    }
-
-    pub(crate) fn lap(&mut self, name: &'static str) {
-        let now = Instant::now();
-        self.laps.push((name, (now - self.last).as_secs_f64()));
-        self.last = now;
-    }
-
-    pub(crate) fn into_laps(self) -> Vec<(&'static str, f64)> {
-        self.laps
-    }
 }

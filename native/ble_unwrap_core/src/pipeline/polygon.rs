@@ -12,7 +12,7 @@ use crate::settings::Settings;
 
 use super::flatten::{self, Flat, Flattened, l2};
 use super::memo::Run;
-use super::rungs::{Rung, Rungs};
+use crate::flattening::{Rung, Rungs};
 
 /// Flattens a patch that is one polygon, which cannot be split: as well as it goes, and at worst on a
 /// circle, where every triangulation of a polygon is free of flips.

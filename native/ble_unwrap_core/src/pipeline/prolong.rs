@@ -272,8 +272,8 @@ mod tests {
     use super::*;
     use std::sync::Arc;
 
-    use crate::Progress;
     use crate::mesh::{self, test_surfaces};
+    use crate::progress::Progress;
 
     /// A mesh as a patch of itself, every triangle a polygon.
     fn whole(mesh: &TriMesh) -> Patch {

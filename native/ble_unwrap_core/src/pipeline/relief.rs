@@ -148,8 +148,8 @@ fn cut_to(patch: &Patch, tip: VertexId, root: Option<VertexId>) -> Option<Patch>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Progress;
     use crate::mesh::{TriMesh, measure, test_surfaces};
+    use crate::progress::Progress;
     use nalgebra::Point3;
 
     fn whole(mesh: TriMesh) -> Patch {

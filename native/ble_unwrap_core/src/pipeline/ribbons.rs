@@ -15,7 +15,7 @@ use crate::settings::{Holes, Settings};
 
 use super::flatten;
 use super::memo::Run;
-use super::rungs::{Rung, Rungs};
+use crate::flattening::{Rung, Rungs};
 
 /// A chart is cut if a texture that holds it, whatever its turn, can be filled to no more than this share by all charts, or
 const LEAST_FILL: f64 = 0.25;
@@ -183,8 +183,8 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::Progress;
     use crate::mesh::test_surfaces;
+    use crate::progress::Progress;
     use crate::stretch;
     use nalgebra::Point3;
 

@@ -14,7 +14,7 @@ use crate::settings::{Holes, Settings};
 use super::flatten::{self, Polished};
 use super::memo::Run;
 use super::rigid::Motion;
-use super::rungs::Rungs;
+use crate::flattening::Rungs;
 
 /// What came of sewing two charts together.
 pub(super) enum Joined {
@@ -188,8 +188,8 @@ impl Sides<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Progress;
     use crate::mesh::test_surfaces;
+    use crate::progress::Progress;
     use nalgebra::{Rotation2, Vector2};
 
     /// The faces of a square sheet with their middle in x between two bounds, drawn in the plane turned by some angle.

@@ -4,7 +4,8 @@ use nalgebra::Point3;
 
 use super::*;
 use crate::metrics::{Texture, UvMesh};
-use crate::{Progress, verify};
+use crate::progress::Progress;
+use crate::verify;
 
 const ROUNDING: Rounding = Rounding { texel: [1.0 / 2048.0; 2], diagonal: 1.5 };
 

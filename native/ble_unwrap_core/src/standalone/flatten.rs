@@ -5,11 +5,12 @@ use rayon::prelude::*;
 use robust::{Coord, orient2d};
 use thiserror::Error;
 
+use crate::clock::Clock;
 use crate::embedding::{EmbeddingError, Model};
 use crate::error::UnwrapError;
+use crate::flattening::{Rung, Steps};
 use crate::geodesics::{self, LandmarkDistances};
 use crate::mesh::{self, ConditionOptions, MeshError, MeshInput, Surface, VertexId};
-use crate::pipeline::{Clock, Steps};
 use crate::progress::{Cancelled, Progress, Stage};
 use crate::settings::{MOST_TOGETHER, Settings};
 use crate::stretch::{self, BOUNDARY_REACH, StretchError};
@@ -223,7 +224,7 @@ pub fn flatten(
         {
             best = steps.minimise(&circle, None, Some(BOUNDARY_REACH)).map_err(named)?;
             stretch_iterations += best.iterations;
-            rung = crate::Rung::TutteCircle;
+            rung = Rung::TutteCircle;
         }
         uv = best.uv;
     }

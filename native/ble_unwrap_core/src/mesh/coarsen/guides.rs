@@ -28,8 +28,8 @@ pub(super) fn carried_over(fine: &TriMesh, coarse: TriMesh, vertex: &[VertexId])
 #[cfg(test)]
 mod tests {
     use super::super::coarsen;
-    use crate::Progress;
     use crate::mesh::{HalfedgeId, test_surfaces};
+    use crate::progress::Progress;
 
     #[test]
     fn a_line_across_a_plane_stays_a_line() {

@@ -1,5 +1,4 @@
-//! The steps that take one patch into the plane, each by itself: the pipeline tries them under a limit,
-//! [`standalone::flatten`](crate::standalone::flatten) shows them one by one.
+//! The steps that take one patch into the plane, each by itself.
 
 use nalgebra::Point2;
 
