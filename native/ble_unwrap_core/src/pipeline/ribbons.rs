@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use nalgebra::{Point2, Vector2};
 
 use crate::charts::{Chart, Patch};
-use crate::mesh::{FaceId, HalfedgeId, VertexId};
+use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::Cancelled;
 use crate::segmentation;
 use crate::settings::{Holes, Settings};
@@ -30,6 +30,13 @@ const LEAST_SELF_BORDER: f64 = 0.5;
 const GOOD_FILL: f64 = 0.6;
 /// The cut runs in so much of the length around the middle.
 const MIDDLE: [f64; 2] = [0.4, 0.6];
+/// A cut is no longer than so many times the width of the chart: a straight one is as long as the chart is wide, and one along the
+/// sides of a triangulation up to about 1.4 times that. What is longer runs along the chart, as the diagonals of triangles do that
+/// are as long as the chart itself.
+const MOST_CUT: f64 = 1.5;
+/// A cut is worth its seam if a texture that holds the parts needs at most this share of the length of one that holds the chart. A cut in
+/// the middle of a strip comes to 0.5 to 0.6.
+const LEAST_GAIN: f64 = 0.9;
 /// Turns tried, of a half one.
 const DIRECTIONS: usize = 24;
 /// Cuts in two, one after the other, that a part comes out of at most.
@@ -60,12 +67,13 @@ pub(super) fn cut(
                 done.push(chart);
                 continue;
             }
+            let largest = LEAST_GAIN * hold(&chart.uv, texture);
             match halves(&chart, settings, rungs, progress)? {
-                Some(parts) => {
+                Some(parts) if parts.iter().all(|part| hold(&part.uv, texture) <= largest) => {
                     rungs.take(Rung::Split);
                     open.extend(parts.into_iter().map(|part| (part, cuts + 1)));
                 }
-                None => done.push(chart),
+                _ => done.push(chart),
             }
         }
     }
@@ -121,7 +129,8 @@ fn range(uv: &[Point2<f64>], along: Vector2<f64>) -> (f64, f64) {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)))
 }
 
-/// A chart cut across near the middle of its length; `None` where that is impossible or takes a part over the limit.
+/// A chart cut across near the middle of its length; `None` where that is impossible, takes a part over the limit, or
+/// where the cut would be longer than the chart is wide, as it is where no polygon ends near the middle.
 fn halves(
     chart: &Chart,
     settings: &Settings,
@@ -130,18 +139,14 @@ fn halves(
 ) -> Result<Option<Vec<Chart>>, Cancelled> {
     let (patch, uv) = (&chart.patch, &chart.uv);
     let along = longest(uv);
-    let (low, high) = range(uv, along);
-    let at = |f: &FaceId| {
-        let sum: f64 = patch.mesh.triangle(*f).iter().map(|v| uv[v.index()].coords.dot(&along)).sum();
-        (sum / 3.0 - low) / (high - low)
-    };
-    let ends: [Vec<FaceId>; 2] = [
-        patch.mesh.faces().filter(|f| at(f) < MIDDLE[0]).collect(),
-        patch.mesh.faces().filter(|f| at(f) > MIDDLE[1]).collect(),
-    ];
+    let ends = ends(patch, uv, along);
     let crease_weight = settings.segmentation.crease_weight;
     let parts = segmentation::between(&patch.mesh, &patch.polygon, [&ends[0], &ends[1]], crease_weight, progress)?;
     let Some(parts) = parts else { return Ok(None) };
+    let width = extent(uv, Vector2::new(-along.y, along.x));
+    if border_length(&patch.mesh, &parts.label) > MOST_CUT * width {
+        return Ok(None);
+    }
     let mut charts = Vec::new();
     for (part, start) in with_positions(patch, uv, &parts.label, parts.parts) {
         let topology = part.mesh.topology();
@@ -154,6 +159,34 @@ fn halves(
         }
     }
     Ok(Some(charts))
+}
+
+/// The faces at either end of a chart, between which it may be cut: those of polygons that lie beyond the middle, or reach into it from
+/// there. Polygons that reach over the whole middle are at neither end.
+fn ends(patch: &Patch, uv: &[Point2<f64>], along: Vector2<f64>) -> [Vec<FaceId>; 2] {
+    let (low, high) = range(uv, along);
+    let mut names = patch.polygon.clone();
+    names.sort_unstable();
+    names.dedup();
+    let place = |f: FaceId| names.partition_point(|&name| name < patch.polygon[f.index()]);
+    let mut span = vec![[f64::INFINITY, f64::NEG_INFINITY]; names.len()];
+    for f in patch.mesh.faces() {
+        let [first, last] = &mut span[place(f)];
+        for v in patch.mesh.triangle(f) {
+            let at = (uv[v.index()].coords.dot(&along) - low) / (high - low);
+            (*first, *last) = (first.min(at), last.max(at));
+        }
+    }
+    let [begin, end] = MIDDLE;
+    let faces_of =
+        |is_wanted: &dyn Fn([f64; 2]) -> bool| patch.mesh.faces().filter(|&f| is_wanted(span[place(f)])).collect();
+    [faces_of(&|[first, last]| first < begin && last <= end), faces_of(&|[first, last]| first >= begin && last > end)]
+}
+
+/// Length of the border between parts of a mesh.
+fn border_length(mesh: &TriMesh, label: &[u32]) -> f64 {
+    let parts = |h: HalfedgeId| label[h.face().index()] != label[mesh.twin(h).face().index()];
+    mesh.edges().filter(|&h| !mesh.is_boundary(h) && parts(h)).map(|h| mesh.edge_length(h)).sum()
 }
 
 /// The parts of a patch by label, each with the positions of its vertices.
@@ -194,7 +227,12 @@ mod tests {
 
     /// As long as it has cells, and two wide.
     fn sheet_of(length: usize, across: usize) -> Chart {
-        let mesh = test_surfaces::grid(length, across, [length as f64, 2.0], 0.0);
+        strip([length, across], [length as f64, 2.0])
+    }
+
+    /// A flat rectangle of so many cells, each two triangles that are polygons of their own.
+    fn strip([along, across]: [usize; 2], size: [f64; 2]) -> Chart {
+        let mesh = test_surfaces::grid(along, across, size, 0.0);
         let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
         let patch = Patch::whole(Arc::new(mesh), polygon);
         let uv = patch.mesh.positions().iter().map(|p| p.xy()).collect();
@@ -216,7 +254,7 @@ mod tests {
         for part in &parts {
             assert!(part.l2 < 1.0 + 1e-9 && stretch::boundary_is_simple(&part.patch.mesh, &part.uv));
             let mesh = &part.patch.mesh;
-            let around: f64 = mesh.halfedges().filter(|&h| mesh.is_boundary(h)).map(|h| mesh.edge_length(h)).sum();
+            let around: f64 = boundary_lengths(mesh).iter().sum();
             let straight = part.patch.area() + 4.0;
             assert!((around - straight).abs() < 1e-9, "{around} {straight}: two ends of two edges each");
         }
@@ -243,5 +281,38 @@ mod tests {
         let patch = Patch::whole(Arc::new(mesh), polygon);
         let uv = patch.mesh.positions().iter().map(|p| p.xy()).collect();
         assert_eq!(cut_up(vec![sheet(80), Chart { patch, uv, l2: 1.0 }]).len(), 2);
+    }
+
+    /// Diagonals of triangles as long as the strip are no place for a cut; sides across it are, where there are some.
+    #[test]
+    fn triangles_as_long_as_the_chart_stay_together() {
+        for across in [1, 2, 24] {
+            assert_eq!(cut_up(vec![strip([1, across], [30.0, 2.0])]).len(), 1, "{across} across, no side between");
+            for along in [2, 3, 5] {
+                let parts = cut_up(vec![strip([along, across], [30.0, 2.0])]);
+                assert!((2..=along).contains(&parts.len()), "{along} by {across} cells: {} parts", parts.len());
+                let around: f64 = parts.iter().flat_map(|c| boundary_lengths(&c.patch.mesh)).sum();
+                let straight = 64.0 + 4.0 * (parts.len() - 1) as f64;
+                assert!((around - straight).abs() < 1e-9, "{along} by {across} cells: every cut is straight, {around}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_cut_that_only_takes_off_an_end_is_not_made() {
+        // A side across near one end alone.
+        let mut chart = strip([2, 2], [30.0, 2.0]);
+        let moved = |p: &Point3<f64>| Point3::new(if p.x == 15.0 { 2.0 } else { p.x }, p.y, p.z);
+        let positions: Vec<Point3<f64>> = chart.patch.mesh.positions().iter().map(moved).collect();
+        let triangles: Vec<[u32; 3]> =
+            chart.patch.mesh.triangles().iter().map(|t| t.map(|v| v.index() as u32)).collect();
+        let mesh = test_surfaces::mesh(&positions, &triangles);
+        chart.uv = mesh.positions().iter().map(|p| p.xy()).collect();
+        chart.patch = Patch::whole(Arc::new(mesh), chart.patch.polygon);
+        assert_eq!(cut_up(vec![chart]).len(), 1);
+    }
+
+    fn boundary_lengths(mesh: &TriMesh) -> Vec<f64> {
+        mesh.halfedges().filter(|&h| mesh.is_boundary(h)).map(|h| mesh.edge_length(h)).collect()
     }
 }
