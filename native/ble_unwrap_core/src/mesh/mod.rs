@@ -3,10 +3,12 @@
 //! Knows nothing of charts, UVs or stages.
 
 mod coarsen;
+mod collapse;
 mod condition;
 mod defects;
 mod disjoint_sets;
 mod ear_clipping;
+mod frame;
 mod glue;
 mod groups;
 mod index;
@@ -27,4 +29,3 @@ pub use groups::Groups;
 pub use index::{FaceId, HalfedgeId, VertexId};
 pub use input::{MeshError, MeshInput};
 pub use tri_mesh::{Topology, TriMesh};
-pub(crate) use weld::weld;
