@@ -207,7 +207,7 @@ class Job:
 def measure(selection, uv, *, texture_size, margin, weld=True, weld_distance=0.0):
     """Measures any UVs of a selection, whoever made them; the keys of the native report.
 
-    With `weld`, charts run across vertices at one place as they do in `unwrap`: files often split vertices at every face.
+    With `weld`, charts run across vertices at one place as in `unwrap`: files often split vertices at every face.
     """
     settings = {"texture_size": texture_size, "margin": float(margin), "weld": weld, "weld_distance": weld_distance}
     return dict(

@@ -1,5 +1,7 @@
 """Vertices that count as one: edges of no length, which always are a point, and welding within a distance."""
 
+from itertools import pairwise
+
 import ble_unwrap_native as native
 import numpy as np
 import pytest
@@ -60,7 +62,7 @@ def test_edges_of_no_length_cost_no_chart_and_no_seam(triangles, weld, size):
         original = np.flatnonzero((positions == positions[v]).all(axis=1))
         assert len(np.unique(uv[np.isin(corners, original)], axis=0)) == 1
     # Every triangle with an area has one in the texture, whichever way its face is triangulated.
-    for first, last in zip(offsets, offsets[1:], strict=False):
+    for first, last in pairwise(offsets):
         for k in range(first + 1, last - 1):
             a, b, c = uv[[first, k, k + 1]].astype(float)
             p, q, r = positions[corners[[first, k, k + 1]]]
@@ -71,7 +73,7 @@ def test_edges_of_no_length_cost_no_chart_and_no_seam(triangles, weld, size):
 def test_faces_that_are_a_segment_follow_a_neighbour():
     # Two sheets whose border is joined by quads without width, and one triangle that is a point.
     positions, corners, _ = grid(4, 4)
-    other = positions + [1, 0, 0]
+    other = positions + np.array([1.0, 0.0, 0.0])
     faces = [*corners.reshape(-1, 4), *(corners.reshape(-1, 4) + 25)]
     faces += [[25 + 5 * j, 30 + 5 * j, 9 + 5 * j, 4 + 5 * j] for j in range(4)] + [[7, 7, 7]]
     corners, offsets = flat(faces)
@@ -123,7 +125,9 @@ def test_an_analysis_keeps_its_weld_distance():
     for again in (analysis.unwrap(**QUICK), analysis.unwrap(**QUICK, weld=True, weld_distance=0.01)):
         assert_array_equal(arrays(again)[0], arrays(expected)[0])
     for other in (None, 0.02):
-        with pytest.raises(native.InvalidArgumentError, match="weld_distance .* it must be what it was in the analysis"):
+        with pytest.raises(
+            native.InvalidArgumentError, match="weld_distance .* it must be what it was in the analysis"
+        ):
             analysis.unwrap(weld_distance=other)
 
 

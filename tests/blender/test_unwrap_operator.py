@@ -398,7 +398,7 @@ def triangle_soup(noise):
     x, y = (a.reshape(-1) for a in np.meshgrid(np.linspace(0, 2, 13), np.linspace(0, 1, 9), indexing="ij"))
     positions = np.stack([x, y, 0.3 * np.sin(4 * x)], axis=1)
     first = (np.arange(12)[:, None] * 9 + np.arange(8)).reshape(-1, 1)
-    corners = (first + [[0, 9, 10, 0, 10, 1]]).reshape(-1)
+    corners = (first + np.array([0, 9, 10, 0, 10, 1])).reshape(-1)
     noise = np.random.default_rng(22).normal(0, noise, (len(corners), 3))
     return add_mesh("Soup", positions[corners] + noise, np.arange(len(corners)).reshape(-1, 3))
 

@@ -3,8 +3,8 @@
 use ble_unwrap_core::Progress;
 use ble_unwrap_core::mesh::{ConditionOptions, FaceId, HalfedgeId, MeshError, MeshInput, Surface, condition, measure};
 use ble_unwrap_fixtures::{
-    Case, FlatPolygons, PolyMesh, book, catalogue, grid, ico_sphere, keyhole, moebius, regular_polygon, sculpt_like, soup,
-    torus,
+    Case, FlatPolygons, PolyMesh, book, catalogue, cylinder, grid, ico_sphere, keyhole, moebius, regular_polygon,
+    sculpt_like, soup, torus,
 };
 use proptest::prelude::*;
 
@@ -211,7 +211,8 @@ fn sides_of_no_length_are_points_of_the_surface() {
     let sheet = grid(6, 6, |u, v| [u, v, 0.3 * u * v]);
     let plain = conditioned(&sheet, "sheet").mesh.topology();
     let doubled = sheet.clone().with_sides_of_no_length(|f| f % 5 == 0);
-    for mesh in [doubled.clone(), doubled.clone().triangulated(), doubled.renumbered(3), doubled.renumbered(3).triangulated()]
+    for mesh in
+        [doubled.clone(), doubled.clone().triangulated(), doubled.renumbered(3), doubled.renumbered(3).triangulated()]
     {
         let flat = mesh.flat();
         for weld in [false, true] {
@@ -259,6 +260,17 @@ fn strips_without_width_join_what_they_lie_between() {
 }
 
 #[test]
+fn what_narrows_to_a_point_comes_apart_there() {
+    // An hourglass whose middle ring is one point, and a torus one ring of whose tube is.
+    let hourglass = cylinder(2.0, 24, 8).moved(|[x, y, z]| [(z - 1.0) * x, (z - 1.0) * y, z]);
+    let t = conditioned(&hourglass, "hourglass").mesh.topology();
+    assert_eq!((t.components, t.loops, t.genus(), t.faces), (2, 2, 0, 2 * 24 * 7));
+    let pinched = torus(0.3, 24, 12).moved(|p| if p[0] > 0.0 && p[1] == 0.0 { [1.0, 0.0, 0.0] } else { p });
+    let t = conditioned(&pinched, "pinched torus").mesh.topology();
+    assert_eq!((t.components, t.loops, t.genus()), (1, 0, 0));
+}
+
+#[test]
 fn short_sides_of_small_parts_and_rounds_of_them_keep_their_shape() {
     // A ball whose sides are shorter than 1e-7 of a plate's diagonal, and a disc with a rim of very many sides.
     let ball = ico_sphere(2);
@@ -281,7 +293,8 @@ fn given_triangles_survive_the_loss_of_a_corner() {
     assert_eq!(corners, [[0, 2, 4], [2, 3, 4], [6, 7, 8], [8, 5, 6]]);
     assert_eq!((surface.followers.as_slice(), surface.defects.replaced_triangulations.count), ([[1, 0]].as_slice(), 0));
     let wrong = [[0, 1, 4], [1, 2, 5]];
-    let error = run(&MeshInput { corner_triangles: Some(&wrong), ..input(&mesh, &flat) }, false).expect_err("two faces");
+    let error =
+        run(&MeshInput { corner_triangles: Some(&wrong), ..input(&mesh, &flat) }, false).expect_err("two faces");
     assert_eq!(error, MeshError::TriangleAcrossFaces { triangle: 1, first: 0, second: 1 });
 }
 

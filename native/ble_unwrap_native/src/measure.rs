@@ -84,7 +84,8 @@ pub(crate) fn measure(
     job.get().start(
         call.threads,
         move |progress| {
-            measure_layout(&mesh.input(), &uv, chart.as_deref(), &conditioning, texture, progress).map_err(Failure::from)
+            measure_layout(&mesh.input(), &uv, chart.as_deref(), &conditioning, texture, progress)
+                .map_err(Failure::from)
         },
         |py, layout| Ok(report::measures_to_dict(py, layout)?.into_any().unbind()),
     )?;

@@ -65,8 +65,8 @@ pub(super) fn join_ends(
             if a == b || own > most {
                 continue;
             }
-            let longest =
-                *longest.get_or_insert_with(|| polygons.corners(p).map(|c| length(polygons.side(c))).fold(0.0, f64::max));
+            let longest = *longest
+                .get_or_insert_with(|| polygons.corners(p).map(|c| length(polygons.side(c))).fold(0.0, f64::max));
             // The bits of numbers that are not negative are in their order.
             short.push(([a.min(b), a.max(b)], own.to_bits(), own <= NO_SHARE * longest));
         }
@@ -175,12 +175,7 @@ impl Collapsed {
                 }
             }
         }
-        let mut out = Self {
-            followers: self.followers,
-            edges: self.edges,
-            face_offsets: vec![0],
-            ..Self::default()
-        };
+        let mut out = Self { followers: self.followers, edges: self.edges, face_offsets: vec![0], ..Self::default() };
         let mut whole: Vec<usize> = Vec::new();
         let mut at = 0;
         for same in flat.chunk_by(|a, b| a.ends == b.ends) {

@@ -13,6 +13,7 @@ mod glue;
 mod groups;
 mod index;
 mod input;
+mod irregular;
 pub mod measure;
 mod orient;
 #[cfg(test)]

@@ -149,7 +149,8 @@ impl<'a> Near<'a> {
             }
             let site = self.sites[i];
             self.leaders_near(site, &groups, &grid, &mut near);
-            let joined = near.iter().take(MOST_TRIED).map(|n| n.1).find(|&g| self.takes(g, &mut groups[g as usize], site));
+            let joined =
+                near.iter().take(MOST_TRIED).map(|n| n.1).find(|&g| self.takes(g, &mut groups[g as usize], site));
             group_of[site as usize] = joined.unwrap_or_else(|| {
                 let number = groups.len() as u32;
                 let before = grid.insert(self.cell(&self.places.points[site as usize]), number).unwrap_or(u32::MAX);
@@ -168,13 +169,7 @@ impl<'a> Near<'a> {
     }
 
     /// The groups whose leader is within reach of a site, nearest first, at equal distance the older one.
-    fn leaders_near(
-        &self,
-        site: u32,
-        groups: &[Group],
-        grid: &HashMap<[i64; 3], u32>,
-        near: &mut Vec<(u64, u32)>,
-    ) {
+    fn leaders_near(&self, site: u32, groups: &[Group], grid: &HashMap<[i64; 3], u32>, near: &mut Vec<(u64, u32)>) {
         let p = self.places.points[site as usize];
         let (low, high) = (self.cell(&p.map(|x| x - self.reach)), self.cell(&p.map(|x| x + self.reach)));
         let mut looked_at = 0;

@@ -10,12 +10,8 @@ fn welded(positions: &[[f64; 3]], faces: &[&[i32]], distance: Option<f64>) -> Ve
     for face in faces {
         face_offsets.push(face_offsets[face_offsets.len() - 1] + face.len() as i32);
     }
-    let input = MeshInput {
-        positions,
-        corner_vertices: &corner_vertices,
-        face_offsets: &face_offsets,
-        ..MeshInput::default()
-    };
+    let input =
+        MeshInput { positions, corner_vertices: &corner_vertices, face_offsets: &face_offsets, ..MeshInput::default() };
     let polygons = Polygons::new(&input).expect("a mesh");
     let mut used = vec![false; positions.len()];
     corner_vertices.iter().for_each(|&v| used[v as usize] = true);
