@@ -126,7 +126,7 @@ def test_an_analysis_keeps_its_weld_distance():
         assert_array_equal(arrays(again)[0], arrays(expected)[0])
     for other in (None, 0.02):
         with pytest.raises(
-            native.InvalidArgumentError, match="weld_distance .* it must be what it was in the analysis"
+            native.InvalidArgumentError, match=r"weld_distance .* it must be what it was in the analysis"
         ):
             analysis.unwrap(weld_distance=other)
 
