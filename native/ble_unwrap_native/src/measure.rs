@@ -77,8 +77,8 @@ pub(crate) fn measure(
     let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, None, None)?;
     let uv = arrays::single_rows(uv, Argument { name: "uv", shape: "(c, 2)" })?;
     let chart = chart.map(|given| arrays::indices(given, Argument { name: "chart", shape: "(f,)" })).transpose()?;
-    let packing = call.settings.packing;
     let conditioning = call.settings.conditioning();
+    let packing = call.settings.packing;
     let texture = Texture { width: packing.width, height: packing.height, margin: packing.margin_texels };
     let job = Job::given_or_new(py, job)?;
     job.get().start(

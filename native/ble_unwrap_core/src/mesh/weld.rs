@@ -61,14 +61,11 @@ pub(super) struct Places<'a> {
 /// # Errors
 /// [`Cancelled`].
 pub(super) fn weld(places: &Places<'_>, distance: Option<f64>, progress: &Progress) -> Result<Vec<u32>, Cancelled> {
-    let mut representative = coincident(places.positions, places.used);
+    let site_of = coincident(places.positions, places.used);
     progress.check()?;
     let reach = distance.map_or_else(|| unresolved(places), |d| d / places.frame.half_extent);
     // Below, no two different points are so near.
-    if reach > f64::EPSILON {
-        Near::new(places, &representative, reach).join(&mut representative, progress)?;
-    }
-    Ok(representative)
+    if reach > f64::EPSILON { Near::new(places, &site_of, reach).joined(progress) } else { Ok(site_of) }
 }
 
 /// The lowest vertex at the same position as each vertex, itself where it is alone; equal when every coordinate is.
@@ -137,8 +134,8 @@ impl<'a> Near<'a> {
         Self { places, reach, sites, site_of, polygons_at: None, polygons_of: HashSet::new() }
     }
 
-    /// Gives the vertices of joined sites one representative.
-    fn join(mut self, representative: &mut [u32], progress: &Progress) -> Result<(), Cancelled> {
+    /// The representative of each vertex when sites that are near are joined.
+    fn joined(mut self, progress: &Progress) -> Result<Vec<u32>, Cancelled> {
         let mut groups: Vec<Group> = Vec::with_capacity(self.sites.len());
         let mut group_of = vec![u32::MAX; self.site_of.len()];
         let mut grid: HashMap<[i64; 3], u32> = HashMap::with_capacity(self.sites.len());
@@ -158,10 +155,8 @@ impl<'a> Near<'a> {
                 number
             });
         }
-        for v in (0..representative.len()).filter(|&v| self.places.used[v]) {
-            representative[v] = groups[group_of[self.site_of[v] as usize] as usize].lowest;
-        }
-        Ok(())
+        let lowest = |v: u32| groups.get(group_of[v as usize] as usize).map_or(v, |group| group.lowest);
+        Ok(self.site_of.iter().map(|&site| lowest(site)).collect())
     }
 
     fn cell(&self, p: &Point3<f64>) -> [i64; 3] {
