@@ -12,7 +12,7 @@ STRETCH_SLACK = 1e-3
 # Gaps are searched for up to this distance, or twice the margin: what is reported at that value may be larger.
 SEARCHED_TEXELS = 8
 # Settings whose 0 in the panel is the native module's None.
-ZERO_IS_AUTOMATIC = ("landmark_max", "kernel_width")
+ZERO_IS_AUTOMATIC = ("landmark_max", "kernel_width", "weld_distance")
 
 
 class EngineMissing(Exception):
@@ -112,18 +112,18 @@ def forget():
     _Kept.key = _Kept.analysis = None
 
 
-def _analysis(mesh, weld, threads):
-    """The kept analysis if it is of this mesh, else a new one in its place."""
+def _analysis(mesh, welding, threads):
+    """The kept analysis if it is of this mesh and this welding, else a new one in its place."""
     positional, named = mesh
     digest = hashlib.blake2b(digest_size=16)
     for array in (*positional, *named.values()):
         values = np.ascontiguousarray(array if array is not None else ()).reshape(-1)
         digest.update(f"{values.dtype} {values.shape} ".encode())
         digest.update(values.view(np.uint8))
-    key = digest.digest(), weld
+    key = digest.digest(), *welding.values()
     if _Kept.key != key:
         forget()
-        _Kept.analysis = _translated(lambda module: module.analyse(*positional, **named, weld=weld, threads=threads))
+        _Kept.analysis = _translated(lambda module: module.analyse(*positional, **named, **welding, threads=threads))
         _Kept.key = key
     return _Kept.analysis
 
@@ -132,8 +132,8 @@ def _caller(name, mesh, settings, keep):
     """A call of the function `name` of the native module, or where the analysis is kept of its method."""
     settings = native_settings(settings)
     if keep:
-        weld = settings.pop("weld", False)
-        analysis = _analysis(mesh, weld, settings.get("threads", 0))
+        welding = {"weld": settings.pop("weld", False), "weld_distance": settings.pop("weld_distance", None)}
+        analysis = _analysis(mesh, welding, settings.get("threads", 0))
         return lambda module: getattr(analysis, name)(**settings)
     return lambda module: getattr(module, name)(*mesh[0], **mesh[1], **settings)
 
@@ -204,36 +204,21 @@ class Job:
         return _result(_translated(lambda module: self._job.result()))
 
 
-def coincident_joined(positions, corner_vertices):
-    """Corner vertices in which vertices at exactly the same place count as one."""
-    order = np.lexsort(positions.T)
-    ordered = positions[order]
-    first = np.ones(len(positions), bool)
-    first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    representative = np.empty(len(positions), np.int32)
-    representative[order] = order[np.maximum.accumulate(np.where(first, np.arange(len(order)), 0))]
-    return representative[corner_vertices]
-
-
-def measure(selection, uv, *, texture_size, margin, weld=True):
+def measure(selection, uv, *, texture_size, margin, weld=True, weld_distance=0.0):
     """Measures any UVs of a selection, whoever made them; the keys of the native report.
 
-    With `weld`, charts run across coincident vertices as they do in `unwrap`: files often split vertices at every face.
+    With `weld`, charts run across vertices at one place as in `unwrap`: files often split vertices at every face.
     """
-    corner_vertices = selection.corner_vertices
-    if weld:
-        corner_vertices = coincident_joined(selection.positions, corner_vertices)
-    size = texture_size if isinstance(texture_size, int) else tuple(texture_size)
+    settings = {"texture_size": texture_size, "margin": float(margin), "weld": weld, "weld_distance": weld_distance}
     return dict(
         _translated(
             lambda module: module.measure(
                 selection.positions,
-                corner_vertices,
+                selection.corner_vertices,
                 selection.face_offsets,
                 np.ascontiguousarray(uv, np.float32),
                 corner_triangles=selection.corner_triangles,
-                texture_size=size,
-                margin=float(margin),
+                **native_settings(settings),
             )
         )
     )

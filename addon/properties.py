@@ -173,6 +173,20 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         description="Let charts run across vertices at the same place, as imported files often have; the mesh is kept",
         default=False,
     )
+    weld_distance: FloatProperty(
+        name="Weld Distance",
+        description=(
+            "How near to each other vertices are that Weld Vertices takes for one; never two of one face. "
+            "0 takes what single precision cannot tell apart at this size"
+        ),
+        default=0.0,
+        min=0.0,
+        max=1e6,
+        soft_max=1.0,
+        step=0.1,
+        precision=6,
+        unit="LENGTH",
+    )
     coarse: BoolProperty(
         name="Coarse First",
         description="Decide on a coarse copy where to cut large pieces of surface, which is many times faster",
@@ -384,7 +398,7 @@ BRIDGE_SETTINGS = (
 # What means something for surfaces only, or for clouds only; the other one's functions do not take it.
 SURFACE_SETTINGS = (
     *("use_seams", "follow_seams", "follow_sharp", "follow_materials", "mark_seams"),
-    *("limit_over", "weld", "merge", "least_sewn", "holes", "chart_scale"),
+    *("limit_over", "weld", "weld_distance", "merge", "least_sewn", "holes", "chart_scale"),
     *("crease_weight", "geodesics"),
     *("together_max", "stretch_solver", "stretch_iterations"),
 )
@@ -395,7 +409,13 @@ MAIN_SETTINGS = ("stretch_limit", "texture_size", "margin", "rotation", "use_sea
 ADVANCED_SETTINGS = (
     ("Result", ("uv_map", "uv_map_name", "use_original_bounds", "mark_seams")),
     ("Borders", ("follow_seams", "follow_sharp", "follow_materials", "crease_weight")),
-    ("Charts", ("limit_over", "neighbours", "weld", "coarse", "merge", "least_sewn", "holes", "chart_scale", "seed")),
+    (
+        "Charts",
+        (
+            *("limit_over", "neighbours", "weld", "weld_distance", "coarse", "merge"),
+            *("least_sewn", "holes", "chart_scale", "seed"),
+        ),
+    ),
     ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max", "together_max")),
     ("Embedding", ("model", "kernel_width", "relaxation", "max_sweeps", "tolerance", "update", "initial")),
     ("Stretch", ("stretch_solver", "stretch_iterations")),

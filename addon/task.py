@@ -111,9 +111,9 @@ class UnwrapTask:
         measured = result.report
         warnings = [*self.selection.warnings, *result.report.get("warnings", ())]
         if measure_again:
-            size, weld = self.settings["texture_size"], self.settings["weld"]
+            given = {name: self.settings[name] for name in ("texture_size", "margin", "weld", "weld_distance")}
             try:
-                measured = engine.measure(self.selection, held, texture_size=size, margin=margin, weld=weld)
+                measured = engine.measure(self.selection, held, **given)
             except engine.EngineError as error:  # the UVs are written: say what is known
                 warnings.append(f"The written UVs could not be measured: {error}")
         certificate = engine.certify(measured, margin=margin, warnings=warnings, **limit)

@@ -512,6 +512,7 @@ def test_panel_shows_what_matters(addon):
         "limit_over",
         "mark_seams",
         "weld",
+        "weld_distance",
         "merge",
         "holes",
         "geodesics",

@@ -11,7 +11,7 @@ import addon_loader
 import bpy
 import numpy as np
 import pytest
-from scenes import assert_good, cube, grid, sphere, uvs
+from scenes import add_mesh, assert_good, cube, grid, sphere, uvs
 
 
 def read_png(path):
@@ -90,6 +90,22 @@ def test_split_glb_is_charted_across_its_seams(run_script, files, tmp_path):
     assert done.returncode == 0, done.stdout
     measured = json.loads((tmp_path / "r.json").read_text())["assets"][0]["objects"][0]["measured"]
     assert measured["charts"] == 1
+
+
+def test_files_weld_the_last_digits_of_coordinates_and_a_distance_that_is_given(run_script, files, tmp_path):
+    """STL repeats its vertices at every triangle; programs that transform them first do not repeat every digit."""
+    obj = grid(5, bump=0.1)
+    corners = np.array([obj.data.vertices[v].co for face in obj.data.polygons for v in face.vertices])
+    for name, noise in (("digits", 1e-7), ("coarse", 1e-3)):
+        bpy.data.meshes.remove(obj.data)
+        noise = np.random.default_rng(4).normal(0, noise, corners.shape)
+        obj = add_mesh(name, corners + noise, np.arange(len(corners)).reshape(-1, 4))
+        source = files(f"{name}.stl")
+        given = [] if name == "digits" else ["--weld-distance", "0.01"]
+        done = run_script("unwrap.py", source, "-o", "out", "--report", f"{name}.json", *given)
+        assert done.returncode == 0, done.stdout
+        measured = json.loads((tmp_path / f"{name}.json").read_text())["assets"][0]["objects"][0]["measured"]
+        assert measured["charts"] == 1, name
 
 
 def test_some_failed_is_1_and_the_others_are_written(run_script, files, tmp_path):

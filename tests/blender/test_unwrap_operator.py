@@ -393,6 +393,30 @@ def test_the_redo_panel_finds_the_analysis_and_gives_the_same(addon):
     assert engine._Kept.analysis is None
 
 
+def triangle_soup(noise):
+    """A bent sheet as triangles that share no vertex, every coordinate a little off."""
+    x, y = (a.reshape(-1) for a in np.meshgrid(np.linspace(0, 2, 13), np.linspace(0, 1, 9), indexing="ij"))
+    positions = np.stack([x, y, 0.3 * np.sin(4 * x)], axis=1)
+    first = (np.arange(12)[:, None] * 9 + np.arange(8)).reshape(-1, 1)
+    corners = (first + np.array([0, 9, 10, 0, 10, 1])).reshape(-1)
+    noise = np.random.default_rng(22).normal(0, noise, (len(corners), 3))
+    return add_mesh("Soup", positions[corners] + noise, np.arange(len(corners)).reshape(-1, 3))
+
+
+def test_welding_takes_the_last_digits_of_coordinates_or_a_distance_that_is_given():
+    obj = triangle_soup(noise=1e-7)
+    before = fingerprint(obj)
+    assert unwrap(weld=True) == {"FINISHED"}
+    assert fingerprint(obj) == before
+    assert "in 1 chart" in certificate()[0][1], certificate()
+    assert len(np.unique(uvs(obj), axis=0)) == 117
+    coarse = triangle_soup(noise=1e-3)
+    unwrap(weld=True, weld_distance=0.01)
+    # The written UVs are measured with the same distance: no seams, one chart.
+    assert "in 1 chart" in certificate()[0][1], certificate()
+    assert len(np.unique(uvs(coarse), axis=0)) == 117
+
+
 def test_seams_of_the_result_are_marked_on_request():
     obj = cube()
     unwrap(mark_seams=True)

@@ -104,7 +104,7 @@ impl Polygons {
     }
 
     fn surface(&self) -> Surface {
-        condition(&self.input(), &ConditionOptions { weld: true }, &Progress::new()).expect("a valid mesh")
+        condition(&self.input(), &ConditionOptions::default(), &Progress::new()).expect("a valid mesh")
     }
 
     /// The surface as the one piece it is.

@@ -3,6 +3,7 @@
 use crate::embedding::{EmbeddingSettings, Model};
 use crate::error::UnwrapError;
 use crate::geodesics::GeodesicSettings;
+use crate::mesh::ConditionOptions;
 use crate::packing::PackSettings;
 use crate::segmentation::SegmentationSettings;
 use crate::stretch::StretchSettings;
@@ -56,10 +57,13 @@ pub struct Settings {
     pub stretch_limit: f64,
     /// Of what: of every chart, or of all together.
     pub limit_over: LimitOver,
-    /// Whether vertices at exactly the same position count as one. Off by default: an edge between two
+    /// Whether vertices at the same position count as one. Off by default: an edge between two
     /// vertices of the input is then a seam only if the result says so. Turn it on for data that
     /// repeats vertices along seams of its own, as many file formats do.
     pub weld: bool,
+    /// How near to each other such vertices are, in the unit of the input; `None` for what single precision cannot tell
+    /// apart. See [`ConditionOptions::weld_distance`].
+    pub weld_distance: Option<f64>,
     /// Whether large components are cut on a coarse mesh first. Off, as in the paper's presets, patches are embedded by all
     /// landmarks and ribbons stay whole, too.
     pub coarse: bool,
@@ -99,6 +103,7 @@ impl Default for Settings {
             stretch_limit: 1.1,
             limit_over: LimitOver::Chart,
             weld: false,
+            weld_distance: None,
             coarse: true,
             merge: true,
             least_sewn: 0.2,
@@ -151,6 +156,12 @@ impl Settings {
     /// is below [`NEVER_SEWN`].
     pub(crate) fn wants_darts(&self) -> bool {
         self.least_sewn < NEVER_SEWN
+    }
+
+    /// What a mesh is conditioned with.
+    #[must_use]
+    pub fn conditioning(&self) -> ConditionOptions {
+        ConditionOptions { weld: self.weld, weld_distance: self.weld_distance }
     }
 
     /// The L2 stretch that a single chart may have: the limit, or where that is over the atlas 1 and four times what the
@@ -223,7 +234,18 @@ impl Settings {
                 return Err(UnwrapError::Setting { name, value: value.to_string(), allowed });
             }
         }
-        Ok(())
+        check_weld_distance(self.weld_distance)
+    }
+}
+
+/// Checks the range of a weld distance.
+pub(crate) fn check_weld_distance(distance: Option<f64>) -> Result<(), UnwrapError> {
+    match distance.filter(|d| !(*d >= 0.0 && d.is_finite())) {
+        None => Ok(()),
+        Some(d) => {
+            let (value, allowed) = (d.to_string(), "0 or more, in the unit of the positions");
+            Err(UnwrapError::Setting { name: "weld_distance", value, allowed })
+        }
     }
 }
 

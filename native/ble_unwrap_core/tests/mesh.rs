@@ -3,18 +3,21 @@
 use ble_unwrap_core::Progress;
 use ble_unwrap_core::mesh::{ConditionOptions, FaceId, HalfedgeId, MeshError, MeshInput, Surface, condition, measure};
 use ble_unwrap_fixtures::{
-    Case, FlatPolygons, PolyMesh, book, catalogue, grid, keyhole, moebius, sculpt_like, soup, torus,
+    Case, FlatPolygons, PolyMesh, book, catalogue, cylinder, grid, ico_sphere, keyhole, moebius, regular_polygon,
+    sculpt_like, soup, torus,
 };
 use proptest::prelude::*;
 
 fn run(input: &MeshInput<'_>, weld: bool) -> Result<Surface, MeshError> {
-    condition(input, &ConditionOptions { weld }, &Progress::new())
+    condition(input, &ConditionOptions { weld, ..ConditionOptions::default() }, &Progress::new())
 }
 
 /// Everything [`Surface`] promises, on any input that was accepted.
 fn check(input: &MeshInput<'_>, surface: &Surface) -> Result<(), String> {
     let mesh = &surface.mesh;
     mesh.check_invariants()?;
+    let vertex = |corner: u32| input.corner_vertices[corner as usize] as usize;
+    let point = |corner: u32| surface.representative[vertex(corner)];
     let mut seen = vec![false; input.corner_vertices.len()];
     let mut triangles = vec![0; input.face_offsets.len().saturating_sub(1)];
     for f in mesh.faces() {
@@ -27,9 +30,9 @@ fn check(input: &MeshInput<'_>, surface: &Surface) -> Result<(), String> {
                 return Err(format!("{h} of face {polygon} lies at corner {corner}"));
             }
             seen[corner as usize] = true;
-            let (v, p) = (input.corner_vertices[corner as usize] as usize, mesh.position(mesh.from(h)));
+            let (v, p) = (vertex(corner), mesh.position(mesh.from(h)));
             let w = surface.vertex[mesh.from(h).index()] as usize;
-            if input.positions[v] != input.positions[w] {
+            if point(corner) != surface.representative[w] {
                 return Err(format!("corner {corner} of vertex {v} became one of vertex {w}"));
             }
             if p.iter().any(|x| !x.is_finite()) {
@@ -45,14 +48,43 @@ fn check(input: &MeshInput<'_>, surface: &Surface) -> Result<(), String> {
             return Err(format!("{f} is out of order"));
         }
     }
-    let mut left_out = surface.unmapped.iter().peekable();
+    let used: Vec<usize> = (0..seen.len()).filter(|&c| seen[c]).map(|c| vertex(c as u32)).collect();
+    let largest = used.iter().flat_map(|&v| input.positions[v]).fold(0.0, |most: f64, x| most.max(x.abs()));
+    for (v, &r) in surface.representative.iter().enumerate() {
+        // Two groups' reach around a leader, as the documentation derives it.
+        let near = |k: usize| (input.positions[v][k] - input.positions[r as usize][k]).abs() <= 4e-6 * largest;
+        if r as usize > v || surface.representative[r as usize] != r || v != r as usize && !(0..3).all(near) {
+            return Err(format!("vertex {v} became {r}"));
+        }
+    }
+    let mut left_out = vec![0; triangles.len()];
+    for &[corner, with] in &surface.followers {
+        if seen[corner as usize] || !seen[with as usize] || point(corner) != point(with) {
+            return Err(format!("corner {corner} follows {with}"));
+        }
+        let polygon = input.face_offsets.partition_point(|&offset| offset as u32 <= corner) - 1;
+        left_out[polygon] += 1;
+    }
+    surface.followers.iter().for_each(|f| seen[f[0] as usize] = true);
+    for &[polygon, with] in &surface.absorbed {
+        if triangles[polygon as usize] > 0 || triangles[with as usize] == 0 {
+            return Err(format!("face {polygon} is absorbed by {with}"));
+        }
+    }
+    let mut unmapped = surface.unmapped.iter().peekable();
     for (polygon, pair) in input.face_offsets.windows(2).enumerate() {
         let (begin, end) = (pair[0] as usize, pair[1] as usize);
-        let unmapped = left_out.next_if(|&&p| p as usize == polygon).is_some();
-        let expected = if unmapped { 0 } else { end - begin - 2 };
+        let unmapped = unmapped.next_if(|&&p| p as usize == polygon).is_some();
+        let absorbed = surface.absorbed.binary_search_by_key(&(polygon as u32), |a| a[0]).is_ok();
+        let expected = if unmapped || absorbed { 0 } else { end - begin - left_out[polygon] - 2 };
         if triangles[polygon] != expected || seen[begin..end].contains(&unmapped) {
             return Err(format!("face {polygon} of {} corners has {} triangles", end - begin, triangles[polygon]));
         }
+    }
+    let places = surface.places();
+    let mapped = seen.iter().filter(|seen| **seen).count();
+    if places.len() != mapped || places.windows(2).any(|w| w[0].0 >= w[1].0) {
+        return Err(format!("{} places of {mapped} corners", places.len()));
     }
     Ok(())
 }
@@ -172,6 +204,98 @@ fn a_keyhole_is_a_disk_whose_bridge_stays_open() {
     assert!(surface.mesh.topology().is_disk());
     assert_eq!((surface.mesh.vertex_count(), surface.defects.repeated_vertices.count), (10, 1));
     assert_eq!(surface.defects.bow_tie_vertices.count, 0);
+}
+
+#[test]
+fn sides_of_no_length_are_points_of_the_surface() {
+    let sheet = grid(6, 6, |u, v| [u, v, 0.3 * u * v]);
+    let plain = conditioned(&sheet, "sheet").mesh.topology();
+    let doubled = sheet.clone().with_sides_of_no_length(|f| f % 5 == 0);
+    for mesh in
+        [doubled.clone(), doubled.clone().triangulated(), doubled.renumbered(3), doubled.renumbered(3).triangulated()]
+    {
+        let flat = mesh.flat();
+        for weld in [false, true] {
+            let surface = run(&input(&mesh, &flat), weld).expect("valid");
+            assert_eq!(check(&input(&mesh, &flat), &surface), Ok(()));
+            let t = surface.mesh.topology();
+            assert_eq!((t.vertices, t.faces, t.loops), (plain.vertices, plain.faces, 1), "welded: {weld}");
+            assert_eq!(surface.defects.edges_of_no_length.count, 8);
+            assert_eq!((surface.defects.zero_area_triangles.count, surface.defects.repeated_vertices.count), (0, 0));
+        }
+    }
+    let flat = doubled.flat();
+    let warnings = run(&input(&doubled, &flat), false).expect("valid").defects.warnings();
+    assert_eq!(warnings, ["8 edges have no length and became a point (first between vertices 0 and 49)."]);
+}
+
+#[test]
+fn a_vertex_listed_twice_in_a_row_counts_once() {
+    let mut mesh = grid(4, 4, |u, v| [u, v, 0.0]);
+    let plain = conditioned(&mesh, "sheet").mesh.topology();
+    for face in &mut mesh.faces {
+        face.insert(1, face[0]);
+        face.insert(1, face[0]);
+        // Over the end of the list, too.
+        face.rotate_left(2);
+    }
+    assert_eq!(conditioned(&mesh, "stutter").mesh.topology(), plain);
+}
+
+#[test]
+fn strips_without_width_join_what_they_lie_between() {
+    // Two sheets side by side with borders of their own, and quads of no width from one border to the other.
+    let mut mesh = grid(4, 8, |u, v| [u, v, 0.0]).joined(&grid(4, 8, |u, v| [u + 1.0, v, 0.0]));
+    let whole = conditioned(&mesh, "welded").mesh.topology();
+    mesh.faces.extend((0..8).map(|j| vec![36 + j, 45 + j, 46 + j, 37 + j]));
+    let flat = mesh.flat();
+    let surface = run(&input(&mesh, &flat), false).expect("valid");
+    assert_eq!(check(&input(&mesh, &flat), &surface), Ok(()));
+    assert_eq!(surface.mesh.topology(), whole);
+    assert_eq!(surface.absorbed.len(), 8);
+    // Marked as seams, the long sides of the strip stay apart.
+    let seams: Vec<[i32; 2]> = (36..44).map(|v| [v, v + 1]).collect();
+    let cut = run(&MeshInput { seams: &seams, ..input(&mesh, &flat) }, false).expect("valid");
+    assert_eq!(cut.mesh.topology().components, 2);
+}
+
+#[test]
+fn what_narrows_to_a_point_comes_apart_there() {
+    // An hourglass whose middle ring is one point, and a torus one ring of whose tube is.
+    let hourglass = cylinder(2.0, 24, 8).moved(|[x, y, z]| [(z - 1.0) * x, (z - 1.0) * y, z]);
+    let t = conditioned(&hourglass, "hourglass").mesh.topology();
+    assert_eq!((t.components, t.loops, t.genus(), t.faces), (2, 2, 0, 2 * 24 * 7));
+    let pinched = torus(0.3, 24, 12).moved(|p| if p[0] > 0.0 && p[1] == 0.0 { [1.0, 0.0, 0.0] } else { p });
+    let t = conditioned(&pinched, "pinched torus").mesh.topology();
+    assert_eq!((t.components, t.loops, t.genus()), (1, 0, 0));
+}
+
+#[test]
+fn short_sides_of_small_parts_and_rounds_of_them_keep_their_shape() {
+    // A ball whose sides are shorter than 1e-7 of a plate's diagonal, and a disc with a rim of very many sides.
+    let ball = ico_sphere(2);
+    let beside = ball.clone().joined(&grid(1, 1, |u, v| [1e8 * u, 1e8 * v, 0.0]));
+    assert_eq!(conditioned(&beside, "ball").mesh.topology().genus(), 0);
+    assert_eq!(conditioned(&beside, "ball").mesh.face_count(), ball.faces.len() + 2);
+    let rim = regular_polygon(20_000, 0.0).moved(|p| p.map(|x| 1e-5 * x)).joined(&grid(1, 1, |u, v| [u, v, 0.0]));
+    let surface = conditioned(&rim, "rim");
+    let kept = surface.polygon.iter().filter(|&&p| p == 0).count();
+    assert!(kept > 100, "{kept} triangles are left of a disc 2e-5 wide");
+}
+
+#[test]
+fn given_triangles_survive_the_loss_of_a_corner() {
+    let mesh = grid(2, 1, |u, v| [u, v, 0.0]).with_sides_of_no_length(|f| f == 0);
+    let flat = mesh.flat();
+    let given = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [6, 7, 8], [8, 5, 6]];
+    let surface = run(&MeshInput { corner_triangles: Some(&given), ..input(&mesh, &flat) }, false).expect("valid");
+    let corners: Vec<[u32; 3]> = surface.corner.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
+    assert_eq!(corners, [[0, 2, 4], [2, 3, 4], [6, 7, 8], [8, 5, 6]]);
+    assert_eq!((surface.followers.as_slice(), surface.defects.replaced_triangulations.count), ([[1, 0]].as_slice(), 0));
+    let wrong = [[0, 1, 4], [1, 2, 5]];
+    let error =
+        run(&MeshInput { corner_triangles: Some(&wrong), ..input(&mesh, &flat) }, false).expect_err("two faces");
+    assert_eq!(error, MeshError::TriangleAcrossFaces { triangle: 1, first: 0, second: 1 });
 }
 
 #[test]

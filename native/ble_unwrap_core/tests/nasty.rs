@@ -25,8 +25,7 @@ fn judge(input: &MeshInput<'_>, settings: &Settings, atlas: &Atlas) -> Result<(C
     if atlas.uv.len() != input.corner_vertices.len() || atlas.chart.len() != polygons {
         return Err(format!("{} UVs, {} labels", atlas.uv.len(), atlas.chart.len()));
     }
-    let options = ConditionOptions { weld: settings.weld };
-    let surface = condition(input, &options, &progress).map_err(|e| e.to_string())?;
+    let surface = condition(input, &settings.conditioning(), &progress).map_err(|e| e.to_string())?;
     let unmapped: Vec<u32> = (0..polygons as u32).filter(|&p| atlas.chart[p as usize] < 0).collect();
     if unmapped != surface.unmapped {
         return Err(format!("{unmapped:?} without a chart, expected {:?}", surface.unmapped));
@@ -157,6 +156,65 @@ fn faces_without_area_get_some() {
     let nothing =
         PolyMesh { positions: vec![[7.0; 3]; 5], faces: vec![vec![0, 1, 2], vec![0, 1, 2, 3, 4], vec![1, 1, 1]] };
     unwrapped(&nothing, &Settings::default(), "no area at all");
+}
+
+/// The figures of an atlas by a fan of triangles over every face, those without area among them, under the vertex numbers
+/// of the input: as a reader sees it that knows nothing of how the mesh was conditioned.
+fn fanned(mesh: &PolyMesh, atlas: &Atlas) -> Measures {
+    let positions: Vec<Point3<f64>> = mesh.positions.iter().map(|&p| Point3::from(p)).collect();
+    let offsets = mesh.flat().face_offsets;
+    let fan = |f: usize| {
+        let first = offsets[f] as u32;
+        (2..mesh.faces[f].len() as u32).map(move |k| [0, k - 1, k].map(|c| first + c))
+    };
+    let corners: Vec<[u32; 3]> = (0..mesh.faces.len()).flat_map(fan).collect();
+    let vertex: Vec<u32> = mesh.faces.concat();
+    let triangles: Vec<[u32; 3]> = corners.iter().map(|t| t.map(|c| vertex[c as usize])).collect();
+    let texture = Texture::square(2048, 4.0);
+    let layout = UvMesh::new(&positions, &triangles, &atlas.uv, &corners, &[], texture).expect("arrays that fit");
+    measure(&layout, &Progress::new()).expect("not cancelled")
+}
+
+#[test]
+fn edges_of_no_length_cost_no_chart_and_no_seam() {
+    let (s, c) = 0.7_f64.sin_cos();
+    for size in [1e-3, 1.0, 1e3] {
+        let turned = |[x, y, z]: [f64; 3]| [c * x - s * z, y, s * x + c * z].map(|x| size * x);
+        let sheet = grid(6, 6, |u, v| [u, v, 0.3 * u * v]).moved(turned).with_sides_of_no_length(|f| f % 5 == 0);
+        // Not quite at one place either, as other programs write them.
+        let mut near = sheet.clone();
+        near.positions[49..].iter_mut().for_each(|p| p[0] += 5e-8 * size);
+        for mesh in [sheet.clone(), sheet.triangulated(), near.clone(), near.triangulated()] {
+            for weld in [false, true] {
+                let plain = || unwrapped(&mesh, &Settings::default(), "doubled corners").0;
+                let atlas = if weld { unwrapped_welded(&mesh).0 } else { plain() };
+                let report = &atlas.report;
+                assert_eq!((report.charts, report.seam_length), (1, 0.0), "size {size}, welded: {weld}");
+                assert!(report.l2 < 1.005, "size {size}, welded: {weld}: {}", report.l2);
+                let seen = fanned(&mesh, &atlas);
+                assert_eq!((seen.charts, seen.flips, seen.overlaps, seen.unmapped_faces), (1, 0, 0, 0));
+                assert_eq!((seen.uv_degenerate_faces, seen.seam_length), (0, 0.0), "size {size}, welded: {weld}");
+            }
+        }
+    }
+}
+
+#[test]
+fn vertices_that_differ_in_their_last_digits_weld() {
+    let sheet = soup(&grid(12, 8, |u, v| [2.0 * u, v, 0.3 * (4.0 * u).sin()]).triangulated());
+    let wobble = |x: f64, k: usize| x + 1e-7 * ((k as f64 * 12.9898).sin() * 43758.5453).fract();
+    for (size, place) in [(1.0, 0.0), (1e-3, 0.0), (1e3, 0.0), (1.0, 1e3)] {
+        let mut mesh = sheet.clone();
+        for (i, p) in mesh.positions.iter_mut().enumerate() {
+            *p = [0, 1, 2].map(|k| f64::from((size * wobble(p[k], 3 * i + k) + place) as f32));
+        }
+        let (atlas, _) = unwrapped_welded(&mesh);
+        assert_eq!((atlas.report.charts, atlas.report.seam_length), (1, 0.0), "size {size} at {place}");
+        let exact = Settings { weld: true, weld_distance: Some(0.0), ..Settings::default() };
+        let flat = mesh.flat();
+        let apart = unwrap(&input(&mesh, &flat), &exact, &Progress::new()).expect("unwraps");
+        assert!(apart.report.charts > 1, "size {size} at {place}: a test of nothing");
+    }
 }
 
 #[test]

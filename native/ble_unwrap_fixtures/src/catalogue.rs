@@ -78,7 +78,7 @@ fn bumpy(u: f64, v: f64) -> [f64; 3] {
     [u, v, 0.2 * (7.0 * u).sin() * (5.0 * v).cos()]
 }
 
-static CASES: [Case; 53] = [
+static CASES: [Case; 55] = [
     Case::new("nothing", Facts::manifold(0, 0, 0), PolyMesh::default),
     Case::new("one triangle", DISK, || spherical_cap(1.0, 1).retained(|f| f == 0)),
     Case::new("flat grid", DISK, || grid(20, 20, |u, v| [u, v, 0.0])),
@@ -139,6 +139,10 @@ static CASES: [Case; 53] = [
     Case::new("pentagram", DISK, || star_polygon(5)),
     Case::new("comb", DISK, || comb(40)),
     Case::new("keyhole", DISK, keyhole),
+    Case::new("sides of no length", DISK, || grid(12, 12, bumpy).with_sides_of_no_length(|f| f % 5 == 0)),
+    Case::new("triangles of no length", DISK, || {
+        grid(12, 12, bumpy).with_sides_of_no_length(|f| f % 5 == 0).triangulated()
+    }),
     Case::new("terrain", DISK, || terrain(48, 3)),
     Case::new("face", DISK, face_like),
     Case::new("small sculpt", BALL, || sculpt_like(2500)),

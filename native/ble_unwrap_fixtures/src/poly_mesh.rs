@@ -70,6 +70,18 @@ impl PolyMesh {
         self
     }
 
+    /// The same mesh in which the faces for which `double` holds have their first corner twice, before it by a vertex of its
+    /// own that lies at the same place: a side of no length.
+    #[must_use]
+    pub fn with_sides_of_no_length(mut self, double: impl Fn(usize) -> bool) -> Self {
+        for (_, face) in self.faces.iter_mut().enumerate().filter(|(i, _)| double(*i)) {
+            let copy = self.positions.len() as u32;
+            self.positions.push(self.positions[face[0] as usize]);
+            face.insert(0, copy);
+        }
+        self
+    }
+
     /// The faces for which `keep` holds, and the vertices they use.
     #[must_use]
     pub fn retained(&self, keep: impl Fn(usize) -> bool) -> Self {

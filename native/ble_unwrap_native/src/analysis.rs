@@ -21,6 +21,8 @@ use crate::unwrap::{MeshArrays, to_python};
 /// ----------
 /// weld : bool
 ///     Whether vertices at the same position count as one.
+/// weld_distance : float or None
+///     How near to each other such vertices are.
 #[pyclass(frozen, module = "ble_unwrap_native")]
 pub(crate) struct Analysis {
     shared: Arc<ble_unwrap_core::Analysis>,
@@ -30,10 +32,16 @@ pub(crate) struct Analysis {
 impl Analysis {
     #[getter]
     fn weld(&self) -> bool {
-        self.shared.weld()
+        self.shared.conditioning().weld
     }
 
-    /// Unwrap the mesh: the function ``unwrap`` with its settings, of which ``weld`` can only be as in ``analyse``.
+    #[getter]
+    fn weld_distance(&self) -> Option<f64> {
+        self.shared.conditioning().weld_distance
+    }
+
+    /// Unwrap the mesh: the function ``unwrap`` with its settings, of which ``weld`` and ``weld_distance`` can only be as in
+    /// ``analyse``.
     ///
     /// Parameters
     /// ----------
@@ -77,8 +85,12 @@ impl Analysis {
         settings: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, Job>> {
         let mut call: Call = settings::from_keywords(settings, Function::Unwrap)?;
-        if !settings.map_or(Ok(false), |given| given.contains("weld"))? {
-            call.settings.weld = self.shared.weld();
+        let is_given = |name| settings.map_or(Ok(false), |given| given.contains(name));
+        if !is_given("weld")? {
+            call.settings.weld = self.weld();
+        }
+        if !is_given("weld_distance")? {
+            call.settings.weld_distance = self.weld_distance();
         }
         let job = Job::given_or_new(py, job)?;
         let shared = Arc::clone(&self.shared);
@@ -102,6 +114,8 @@ impl Analysis {
 ///     A new ``Job``, by which another thread watches or cancels this call.
 /// weld : bool
 ///     Whether vertices at the same position count as one.
+/// weld_distance : float, at least 0, or None
+///     How near to each other such vertices are, as in ``unwrap``.
 /// threads : int
 ///     Threads to work with; 0 for as many as the machine has.
 ///
@@ -135,7 +149,7 @@ pub(crate) fn analyse(
     let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, seams, guides)?;
     let job = Job::given_or_new(py, job)?;
     let work = move |progress: &_| {
-        ble_unwrap_core::Analysis::new(&mesh.input(), call.settings.weld, progress).map_err(Failure::from)
+        ble_unwrap_core::Analysis::new(&mesh.input(), &call.settings.conditioning(), progress).map_err(Failure::from)
     };
     let deliver = |py: Python<'_>, analysis| Ok(Py::new(py, Analysis { shared: Arc::new(analysis) })?.into_any());
     job.get().start(call.threads, work, deliver)?;

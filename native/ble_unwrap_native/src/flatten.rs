@@ -58,7 +58,8 @@ impl Flattening {
 ///     A new ``Job``, by which another thread watches or cancels this call.
 /// geodesics, landmark_fraction, landmark_min, landmark_max, together_max
 ///     As for ``unwrap``, but a ``landmark_fraction`` of 1 embeds all vertices together, whatever the bounds.
-/// model, kernel_width, relaxation, max_sweeps, tolerance, update, initial, seed, weld, stretch_solver, stretch_iterations
+/// model, kernel_width, relaxation, max_sweeps, tolerance, update, initial, seed, weld, weld_distance, stretch_solver,
+/// stretch_iterations
 ///     As for ``unwrap``.
 /// preset, threads
 ///     As for ``unwrap``.

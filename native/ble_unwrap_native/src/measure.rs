@@ -24,6 +24,8 @@ use crate::unwrap::MeshArrays;
 ///     Negative for faces without UVs. Charts themselves are found from the UVs.
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
+/// weld, weld_distance : bool, float or None
+///     As for ``unwrap``: which vertices count as one. Without ``weld`` an edge between two vertices of the mesh is no seam.
 /// texture_size : int or (int, int)
 ///     Width and height of the texture in texels.
 /// margin : float
@@ -55,7 +57,7 @@ use crate::unwrap::MeshArrays;
 /// Notes
 /// -----
 /// Guaranteed: any UVs will do, finite or not. Not guaranteed: exactness; overlaps below 1e-9 of the layout go unseen.
-/// Vertices are not welded. O(n log n); about two seconds for a million triangles on two cores.
+/// O(n log n); about two seconds for a million triangles on two cores.
 ///
 /// Sander, Snyder, Gortler, Hoppe: Texture mapping progressive meshes, SIGGRAPH 2001.
 #[pyfunction]
@@ -75,12 +77,16 @@ pub(crate) fn measure(
     let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, None, None)?;
     let uv = arrays::single_rows(uv, Argument { name: "uv", shape: "(c, 2)" })?;
     let chart = chart.map(|given| arrays::indices(given, Argument { name: "chart", shape: "(f,)" })).transpose()?;
+    let conditioning = call.settings.conditioning();
     let packing = call.settings.packing;
     let texture = Texture { width: packing.width, height: packing.height, margin: packing.margin_texels };
     let job = Job::given_or_new(py, job)?;
     job.get().start(
         call.threads,
-        move |progress| measure_layout(&mesh.input(), &uv, chart.as_deref(), texture, progress).map_err(Failure::from),
+        move |progress| {
+            measure_layout(&mesh.input(), &uv, chart.as_deref(), &conditioning, texture, progress)
+                .map_err(Failure::from)
+        },
         |py, layout| Ok(report::measures_to_dict(py, layout)?.into_any().unbind()),
     )?;
     job.get().finish(py)

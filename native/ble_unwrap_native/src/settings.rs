@@ -88,8 +88,8 @@ struct Setting {
 enum Field {
     Flag(fn(&mut Call) -> &mut bool),
     Real(fn(&mut Call) -> &mut f64, Interval),
-    /// `None` stands for the value the model brings along.
-    OptionalReal(fn(&mut Call) -> &mut Option<f64>, Interval),
+    /// `None` stands for a value that is found; the text says which.
+    OptionalReal(fn(&mut Call) -> &mut Option<f64>, Interval, &'static str),
     Whole(fn(&mut Call) -> &mut usize, [usize; 2]),
     /// `None` stands for no limit, `usize::MAX`.
     Limit(fn(&mut Call) -> &mut usize, [usize; 2]),
@@ -121,12 +121,19 @@ impl Interval {
         Self { least, open: true, most, most_open: true }
     }
 
+    const fn at_least(least: f64) -> Self {
+        Self { least, open: false, most: f64::INFINITY, most_open: true }
+    }
+
     fn contains(self, x: f64) -> bool {
         (x > self.least || !self.open && x == self.least) && (x < self.most || !self.most_open && x == self.most)
     }
 
     fn text(self) -> String {
         let low = if self.open { "above" } else { "at least" };
+        if self.most.is_infinite() {
+            return format!("a number {low} {}", self.least);
+        }
         let high = if self.most_open { "below" } else { "at most" };
         format!("a number {low} {} and {high} {}", self.least, self.most)
     }
@@ -141,7 +148,7 @@ const MOST_TEXELS: u32 = PackSettings::LARGEST_SIZE;
 
 const UNWRAP: &[Function] = &[];
 const CLOUD: &[Function] = &[Function::UnwrapPoints];
-const SURFACE: &[Function] = &[Function::Analyse, Function::Flatten];
+const SURFACE: &[Function] = &[Function::Analyse, Function::Flatten, Function::Measure];
 const FLATTEN: &[Function] = &[Function::Flatten];
 const LANDMARKS: &[Function] = &[Function::Flatten, Function::UnwrapPoints];
 const EMBED: &[Function] = &[Function::Embed, Function::Flatten, Function::UnwrapPoints];
@@ -167,6 +174,7 @@ const TABLE: &[Setting] = &[
     row("stretch_limit", Field::Real(|c| &mut c.settings.stretch_limit, Interval::above(1.0, 1e3)), CLOUD),
     row("limit_over", Field::Word(|c| &mut c.settings.limit_over), UNWRAP),
     row("weld", Field::Flag(|c| &mut c.settings.weld), SURFACE),
+    row("weld_distance", Field::OptionalReal(|c| &mut c.settings.weld_distance, Interval::at_least(0.0), "what single precision cannot tell apart"), SURFACE),
     row("coarse", Field::Flag(|c| &mut c.settings.coarse), CLOUD),
     row("merge", Field::Flag(|c| &mut c.settings.merge), UNWRAP),
     row("least_sewn", Field::Real(|c| &mut c.settings.least_sewn, Interval::closed(0.0, NEVER_SEWN)), UNWRAP),
@@ -180,7 +188,7 @@ const TABLE: &[Setting] = &[
     row("landmark_max", Field::Limit(|c| &mut c.settings.geodesics.landmark_max, [3, 100_000]), LANDMARKS),
     row("together_max", Field::Whole(|c| &mut c.settings.together_max, [0, MOST_TOGETHER]), FLATTEN),
     row("model", Field::Word(|c| &mut c.settings.embedding.model), MODEL),
-    row("kernel_width", Field::OptionalReal(|c| &mut c.settings.embedding.kernel_width, Interval::above(0.0, 1e3)), EMBED),
+    row("kernel_width", Field::OptionalReal(|c| &mut c.settings.embedding.kernel_width, Interval::above(0.0, 1e3), "the model's own"), EMBED),
     row("relaxation", Field::Real(|c| &mut c.settings.embedding.relaxation, Interval::between(0.0, 2.0)), EMBED),
     row("max_sweeps", Field::Whole(|c| &mut c.settings.embedding.max_sweeps, [1, 100_000]), EMBED),
     row("tolerance", Field::Real(|c| &mut c.settings.embedding.tolerance, Interval::between(0.0, 1.0)), EMBED),
@@ -265,11 +273,11 @@ impl Setting {
                 *field(call) = flag(name, value)?;
             }
             Field::Real(field, interval) => *field(call) = real(name, value, *interval, "")?,
-            Field::OptionalReal(field, interval) => {
+            Field::OptionalReal(field, interval, found) => {
                 *field(call) = if value.is_none() {
                     None
                 } else {
-                    Some(real(name, value, *interval, ", or None for the model's own")?)
+                    Some(real(name, value, *interval, &format!(", or None for {found}"))?)
                 };
             }
             Field::Whole(field, range) => *field(call) = whole(name, value, *range, "")?,
@@ -297,7 +305,7 @@ impl Setting {
         Ok(match &self.field {
             Field::Flag(field) => PyBool::new(py, *field(call)).to_owned().into_any(),
             Field::Real(field, _) => field(call).into_pyobject(py)?.into_any(),
-            Field::OptionalReal(field, _) => field(call).into_pyobject(py)?.into_any(),
+            Field::OptionalReal(field, ..) => field(call).into_pyobject(py)?.into_any(),
             Field::Whole(field, _) => field(call).into_pyobject(py)?.into_any(),
             Field::Limit(field, _) => Some(*field(call)).filter(|&n| n != usize::MAX).into_pyobject(py)?.into_any(),
             Field::Seed(field) => field(call).into_pyobject(py)?.into_any(),

@@ -2,33 +2,42 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
-use rayon::slice::ParallelSliceMut;
+use nalgebra::Point3;
 
+use super::collapse::{Collapsed, join_ends};
 use super::defects::Defects;
+use super::frame::Frame;
 use super::glue::{Glued, Sides};
 use super::index::{HalfedgeId, VertexId};
 use super::input::{MeshError, MeshInput, Polygons};
+use super::irregular::{count_bow_ties, count_duplicates, count_welded, severed_vertices};
 use super::measure::triangle_area;
 use super::orient::{Orientation, orient};
 use super::tri_mesh::TriMesh;
-use super::triangulate::{Triangulation, triangulate};
-use super::weld::weld;
+use super::triangulate::{Triangulation, check_given, triangulate};
+use super::weld::{Places, weld};
 use crate::progress::Progress;
 
 /// Least area, in units of half the extent squared, that sets the scale. Below, it may be rounding.
 const LEAST_AREA: f64 = 1e-12;
 
 /// Choices of [`condition`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConditionOptions {
-    /// Whether vertices at exactly the same position are one.
+    /// Whether vertices at the same position are one.
     pub weld: bool,
+    /// How near to each other such vertices are, in the unit of the input: 0 for exactly the same coordinates. `None` for
+    /// what single precision cannot tell apart: 2⁻²¹ of the larger of the greatest coordinate and the diagonal of the
+    /// bounding box, at most a thousandth of the mean side. Nothing without `weld`.
+    ///
+    /// A group of vertices lies within the distance around one of them, so chains are broken up. Two vertices of one polygon
+    /// are never welded unless they coincide: no polygon loses a side by it, however long the distance.
+    pub weld_distance: Option<f64>,
 }
 
 impl Default for ConditionOptions {
     fn default() -> Self {
-        Self { weld: true }
+        Self { weld: true, weld_distance: None }
     }
 }
 
@@ -36,7 +45,8 @@ impl Default for ConditionOptions {
 ///
 /// Guaranteed: the invariants of [`TriMesh`]; each polygon is a topological disk of n − 2 triangles
 /// whose inner edges are glued, so cutting along anything but diagonals never splits one; corners
-/// of a polygon are distinct corners of the mesh even where they share a vertex.
+/// of a polygon are distinct corners of the mesh even where they share a vertex. Where a polygon has
+/// a side of no length, n counts its ends as one corner: see [`Surface::followers`].
 ///
 /// Not guaranteed: a boundary, being connected, positive areas, distinct positions.
 #[derive(Clone, Debug)]
@@ -47,8 +57,16 @@ pub struct Surface {
     pub polygon: Vec<u32>,
     /// The input corner of each corner of the mesh.
     pub corner: Vec<u32>,
-    /// The input vertex of each vertex of the mesh: of several welded ones, any.
+    /// The input vertex of each vertex of the mesh: of several that are one, any.
     pub vertex: Vec<u32>,
+    /// The lowest of the input vertices that are one with each input vertex, welded or joined by an edge of no length.
+    pub representative: Vec<u32>,
+    /// Each input corner that is no corner of the mesh, since a side of no length ends there, with the input corner that
+    /// lies at the same point and is.
+    pub followers: Vec<[u32; 2]>,
+    /// Each input polygon that is nothing but a segment or a point on the border of another, with that one; it has no
+    /// triangles, and its corners follow the other's. Ascending.
+    pub absorbed: Vec<[u32; 2]>,
     /// Whether a half-edge runs inside a polygon; such edges are never cut.
     pub diagonal: Vec<bool>,
     /// Whether a triangle is wound against its polygon.
@@ -70,6 +88,9 @@ impl Default for Surface {
             polygon: Vec::new(),
             corner: Vec::new(),
             vertex: Vec::new(),
+            representative: Vec::new(),
+            followers: Vec::new(),
+            absorbed: Vec::new(),
             diagonal: Vec::new(),
             reversed: Vec::new(),
             unmapped: Vec::new(),
@@ -85,6 +106,24 @@ impl Surface {
     pub fn is_diagonal(&self, h: HalfedgeId) -> bool {
         self.diagonal[h.index()]
     }
+
+    /// The vertex of the mesh that each input corner lies at, by corner, ascending; corners of unmapped polygons have none.
+    /// O(n log n).
+    #[must_use]
+    pub fn places(&self) -> Vec<(u32, VertexId)> {
+        let mut places: Vec<(u32, VertexId)> =
+            self.mesh.halfedges().map(|h| (self.corner[h.index()], self.mesh.from(h))).collect();
+        places.sort_unstable();
+        places.dedup();
+        let own = places.len();
+        for &[corner, with] in &self.followers {
+            if let Ok(at) = places[..own].binary_search_by_key(&with, |p| p.0) {
+                places.push((corner, places[at].1));
+            }
+        }
+        places.sort_unstable();
+        places
+    }
 }
 
 /// Makes an oriented manifold of any mesh.
@@ -93,6 +132,9 @@ impl Surface {
 /// bow-ties, one-sided surfaces, keyholes and inconsistent windings come apart where they must and
 /// nowhere else. Most area of each component keeps its input winding. Faces with a non-finite
 /// vertex are left out and listed. A mesh without faces gives an empty surface.
+///
+/// Edges of no length become points: those whose ends are one vertex or lie at one position, or within
+/// 1e-7 of the bounding box's diagonal and a thousandth of the longest side of each of their polygons.
 ///
 /// O(n log n); deterministic, whatever the number of threads.
 ///
@@ -114,18 +156,69 @@ pub fn condition(input: &MeshInput<'_>, options: &ConditionOptions, progress: &P
         .collect();
     progress.check()?;
 
-    let triangulation = triangulate(&polygons, &mapped, &points, input.corner_triangles, progress)?;
+    let mut representative: Vec<u32> = if options.weld {
+        let (polygons, mapped, positions, used) = (&polygons, &mapped, input.positions, &used);
+        let places = Places { polygons, mapped, positions, used, points: &points, frame: &frame };
+        weld(&places, options.weld_distance, progress)?
+    } else {
+        (0..input.positions.len() as u32).collect()
+    };
+    count_welded(&representative, &mut defects);
+    join_ends(&polygons, &mapped, &points, frame.diagonal, &mut representative);
+    progress.check()?;
+
+    let unmapped = (0..polygons.len() as u32).filter(|&p| !mapped[p as usize]).collect();
+    let surface = match Collapsed::new(&polygons, &mapped, &representative) {
+        None => surface_of(&polygons, &mapped, &points, &representative, input, defects, progress)?,
+        Some(collapsed) => {
+            collapsed.edges.iter().for_each(|&edge| defects.edges_of_no_length.found(edge));
+            let given = input.corner_triangles;
+            given.map_or(Ok(()), |given| check_given(&polygons, given))?;
+            let given = given.map(|given| collapsed.triangles(given, polygons.corner_count()));
+            let input = MeshInput {
+                corner_vertices: &collapsed.corner_vertices,
+                face_offsets: &collapsed.face_offsets,
+                corner_triangles: given.as_deref(),
+                ..*input
+            };
+            let mapped: Vec<bool> = collapsed.polygon.iter().map(|&p| mapped[p as usize]).collect();
+            let polygons = Polygons::new(&input)?;
+            let surface = surface_of(&polygons, &mapped, &points, &representative, &input, defects, progress)?;
+            uncollapsed(surface, collapsed)
+        }
+    };
+    Ok(Surface { unmapped, representative, scale: (surface.scale * frame.half_extent).min(f64::MAX), ..surface })
+}
+
+/// A surface of collapsed polygons with the numbers of the input.
+fn uncollapsed(mut surface: Surface, collapsed: Collapsed) -> Surface {
+    surface.corner.iter_mut().for_each(|c| *c = collapsed.corner[*c as usize]);
+    surface.polygon.iter_mut().for_each(|p| *p = collapsed.polygon[*p as usize]);
+    surface.defects.renumber_faces(|p| collapsed.polygon[p as usize]);
+    Surface { followers: collapsed.followers, absorbed: collapsed.absorbed, ..surface }
+}
+
+/// The surface of polygons none of whose sides are to be collapsed, in the frame's unit, with `defects` and those found.
+/// Of `input`, which holds the same polygons, only triangles, seams and guides are looked at.
+fn surface_of(
+    polygons: &Polygons<'_>,
+    mapped: &[bool],
+    points: &[Point3<f64>],
+    representative: &[u32],
+    input: &MeshInput<'_>,
+    mut defects: Defects,
+    progress: &Progress,
+) -> Result<Surface, MeshError> {
+    let triangulation = triangulate(polygons, mapped, points, input.corner_triangles, progress)?;
     defects.replaced_triangulations = triangulation.replaced;
-    let inner = InnerEdges::new(&polygons, &triangulation);
-    let representative =
-        if options.weld { weld(input.positions, &used) } else { (0..input.positions.len() as u32).collect() };
+    let inner = InnerEdges::new(polygons, &triangulation);
     progress.check()?;
 
     let sides = Sides {
-        polygons: &polygons,
-        mapped: &mapped,
-        points: &points,
-        representative: &representative,
+        polygons,
+        mapped,
+        points,
+        representative,
         triangles: &triangulation.triangles,
         side_halfedge: &inner.side_halfedge,
         seams: input.seams,
@@ -134,7 +227,7 @@ pub fn condition(input: &MeshInput<'_>, options: &ConditionOptions, progress: &P
     defects.non_manifold_edges = non_manifold;
     progress.check()?;
 
-    let (areas, total_area) = polygon_areas(&polygons, &points, &triangulation, &mut defects);
+    let (areas, total_area) = polygon_areas(polygons, points, &triangulation, &mut defects);
     let orientation = orient(polygons.len(), links, |corner| polygons.polygon(corner as usize), &areas);
     for link in &orientation.contradicting {
         let [a, b] = polygons.side(link.sides[0] as usize);
@@ -149,7 +242,7 @@ pub fn condition(input: &MeshInput<'_>, options: &ConditionOptions, progress: &P
     // The second pass of scaling: from unit extent to unit area.
     let unit = if total_area > LEAST_AREA { total_area.sqrt() } else { 1.0 };
     let assembled = assemble(&triangulation, inner, &orientation);
-    let guides = guide_marks(input.guides, &polygons, &representative, &assembled);
+    let guides = guide_marks(input.guides, polygons, representative, &assembled);
     let (mesh, source) = TriMesh::from_glued(&assembled.corner, assembled.twin, |corner| {
         points[polygons.vertex(corner as usize)] / unit
     });
@@ -157,10 +250,9 @@ pub fn condition(input: &MeshInput<'_>, options: &ConditionOptions, progress: &P
     let vertex: Vec<u32> = source.iter().map(|&c| polygons.vertex(c as usize) as u32).collect();
     progress.check()?;
 
-    count_welded(&representative, &mut defects);
-    let severed = severed_vertices(&polygons, &mapped, &representative, &severed, &mut defects);
-    count_bow_ties(&polygons, &mesh, &assembled.corner, &severed, &mut defects);
-    count_duplicates(&polygons, &mapped, &mut defects);
+    let severed = severed_vertices(polygons, mapped, representative, &severed, &mut defects);
+    count_bow_ties(polygons, &mesh, &assembled.corner, &severed, &mut defects);
+    count_duplicates(polygons, mapped, &mut defects);
     progress.check()?;
 
     Ok(Surface {
@@ -170,9 +262,9 @@ pub fn condition(input: &MeshInput<'_>, options: &ConditionOptions, progress: &P
         vertex,
         diagonal: assembled.diagonal,
         reversed: assembled.reversed,
-        unmapped: (0..polygons.len() as u32).filter(|&p| !mapped[p as usize]).collect(),
         defects,
-        scale: (unit * frame.half_extent).min(f64::MAX),
+        scale: unit,
+        ..Surface::default()
     })
 }
 
@@ -210,36 +302,6 @@ fn used_vertices(polygons: &Polygons<'_>, mapped: &[bool], vertex_count: usize) 
         }
     }
     used
-}
-
-/// The middle and half the longest side of a box; what it holds is placed in [−1, 1]³.
-struct Frame {
-    centre: Vector3<f64>,
-    half_extent: f64,
-}
-
-impl Frame {
-    fn around(positions: &[[f64; 3]], used: &[bool]) -> Self {
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for (p, _) in positions.iter().zip(used).filter(|(_, used)| **used) {
-            for k in 0..3 {
-                low[k] = low[k].min(p[k]);
-                high[k] = high[k].max(p[k]);
-            }
-        }
-        if low[0] > high[0] {
-            return Self { centre: Vector3::zeros(), half_extent: 1.0 };
-        }
-        // Halved before they are added or subtracted: neither overflows.
-        let centre = Vector3::from_fn(|k, _| 0.5 * low[k] + 0.5 * high[k]);
-        let half_extent = (0..3).map(|k| 0.5 * high[k] - 0.5 * low[k]).fold(0.0, f64::max);
-        Self { centre, half_extent: if half_extent > 0.0 { half_extent } else { 1.0 } }
-    }
-
-    fn place(&self, p: &[f64; 3]) -> Point3<f64> {
-        // Divided, not multiplied by an inverse, which overflows for the tiniest extents.
-        Point3::from((Vector3::from(*p) - self.centre) / self.half_extent)
-    }
 }
 
 /// Half-edges of the triangulated polygons as wound in the input, before polygons are joined.
@@ -368,88 +430,4 @@ fn polygon_areas(
         total += area;
     }
     (areas, total)
-}
-
-fn count_welded(representative: &[u32], defects: &mut Defects) {
-    for v in (0..representative.len() as u32).filter(|&v| representative[v as usize] != v) {
-        defects.welded_vertices.found(v);
-    }
-}
-
-/// Vertices at which an edge was cut or at which a polygon meets itself: several fans are no bow-tie
-/// there. Counts the polygons that meet themselves.
-fn severed_vertices(
-    polygons: &Polygons<'_>,
-    mapped: &[bool],
-    representative: &[u32],
-    severed: &[u32],
-    defects: &mut Defects,
-) -> Vec<bool> {
-    let mut marked = vec![false; representative.len()];
-    for &side in severed {
-        for v in polygons.side(side as usize) {
-            marked[v] = true;
-        }
-    }
-    let mut own = Vec::new();
-    for p in (0..polygons.len()).filter(|&p| mapped[p]) {
-        own.clear();
-        own.extend(polygons.corners(p).map(|c| polygons.vertex(c)).map(|v| (representative[v], v)));
-        own.sort_unstable();
-        let mut meets_itself = false;
-        for pair in own.windows(2).filter(|w| w[0].0 == w[1].0) {
-            meets_itself = true;
-            pair.iter().for_each(|&(_, v)| marked[v] = true);
-        }
-        if meets_itself {
-            defects.repeated_vertices.found(p as u32);
-        }
-    }
-    marked
-}
-
-/// Vertices whose corners form several fans although no edge was cut there.
-fn count_bow_ties(polygons: &Polygons<'_>, mesh: &TriMesh, corner: &[u32], severed: &[bool], defects: &mut Defects) {
-    let mut fan = vec![VertexId::NONE; severed.len()];
-    let mut is_bow_tie = vec![false; severed.len()];
-    for (&c, &v) in corner.iter().zip(mesh.triangles().iter().flatten()) {
-        let vertex = polygons.vertex(c as usize);
-        is_bow_tie[vertex] |= !fan[vertex].is_none() && fan[vertex] != v && !severed[vertex];
-        fan[vertex] = v;
-    }
-    for v in (0..is_bow_tie.len()).filter(|&v| is_bow_tie[v]) {
-        defects.bow_tie_vertices.found(v as u32);
-    }
-}
-
-/// Polygons with the same vertices, in any order, as an earlier one.
-fn count_duplicates(polygons: &Polygons<'_>, mapped: &[bool], defects: &mut Defects) {
-    let vertices = |p: usize| polygons.corners(p).map(|c| polygons.vertex(c) as u32);
-    // A sum is the same in any order; scattered, few different sets share one.
-    let mut keyed: Vec<(u64, u32)> = (0..polygons.len())
-        .filter(|&p| mapped[p])
-        .map(|p| (vertices(p).fold(0u64, |sum, v| sum.wrapping_add(scatter(v))), p as u32))
-        .collect();
-    keyed.par_sort_unstable();
-    let sorted = |p: u32| {
-        let mut own: Vec<u32> = vertices(p as usize).collect();
-        own.sort_unstable();
-        own
-    };
-    let mut duplicates = Vec::new();
-    for group in keyed.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
-        let mut sets: Vec<(Vec<u32>, u32)> = group.iter().map(|&(_, p)| (sorted(p), p)).collect();
-        sets.sort_unstable();
-        duplicates.extend(sets.windows(2).filter(|w| w[0].0 == w[1].0).map(|w| w[1].1));
-    }
-    duplicates.sort_unstable();
-    duplicates.iter().for_each(|&p| defects.duplicate_faces.found(p));
-}
-
-/// A 64-bit number for a vertex, by the finaliser of SplitMix64 (Steele, Lea, Flood 2014).
-fn scatter(v: u32) -> u64 {
-    let mut z = (u64::from(v) + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
 }

@@ -35,6 +35,8 @@ pub struct Defects {
     pub contradicting_edges: Defect<[u32; 2]>,
     /// Vertices whose faces hang together at nothing but the vertex.
     pub bow_tie_vertices: Defect<u32>,
+    /// Edges of no length, which became points.
+    pub edges_of_no_length: Defect<[u32; 2]>,
     /// Triangles without area (of the triangulated faces), by face.
     pub zero_area_triangles: Defect<u32>,
     /// Faces wound against most of their component.
@@ -58,6 +60,19 @@ impl Defects {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
+    }
+
+    /// Gives faces other numbers, those of [`Self::unmapped_faces`] excepted.
+    pub(super) fn renumber_faces(&mut self, number: impl Fn(u32) -> u32) {
+        for faces in [
+            &mut self.zero_area_triangles,
+            &mut self.reversed_faces,
+            &mut self.repeated_vertices,
+            &mut self.duplicate_faces,
+            &mut self.replaced_triangulations,
+        ] {
+            faces.first = faces.first.map(&number);
+        }
     }
 
     /// One sentence a kind of defect, in plain words, with the first element concerned.
@@ -96,6 +111,7 @@ impl Defects {
             edge,
         );
         say(&mut out, self.bow_tie_vertices, "vertex joins", "vertices join", "faces that share no edge", vertex);
+        say(&mut out, self.edges_of_no_length, "edge has", "edges have", "no length and became a point", edge);
         say(&mut out, self.zero_area_triangles, "triangle has", "triangles have", "no area", face);
         say(&mut out, self.repeated_vertices, "face uses", "faces use", "the same point more than once", face);
         say(&mut out, self.duplicate_faces, "face repeats", "faces repeat", "the vertices of another face", face);

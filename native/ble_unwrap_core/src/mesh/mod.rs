@@ -3,14 +3,17 @@
 //! Knows nothing of charts, UVs or stages.
 
 mod coarsen;
+mod collapse;
 mod condition;
 mod defects;
 mod disjoint_sets;
 mod ear_clipping;
+mod frame;
 mod glue;
 mod groups;
 mod index;
 mod input;
+mod irregular;
 pub mod measure;
 mod orient;
 #[cfg(test)]
@@ -27,4 +30,3 @@ pub use groups::Groups;
 pub use index::{FaceId, HalfedgeId, VertexId};
 pub use input::{MeshError, MeshInput};
 pub use tri_mesh::{Topology, TriMesh};
-pub(crate) use weld::weld;

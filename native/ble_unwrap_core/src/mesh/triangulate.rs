@@ -72,6 +72,14 @@ pub(super) fn triangulate(
     Ok(out)
 }
 
+/// Checks that each given triangle has corners of one polygon.
+///
+/// # Errors
+/// The first that has not, or more triangles than corners.
+pub(super) fn check_given(polygons: &Polygons<'_>, given: &[[i32; 3]]) -> Result<(), MeshError> {
+    GivenTriangles::new(polygons, given).map(|_| ())
+}
+
 /// Given triangles sorted by polygon.
 struct GivenTriangles<'a> {
     triangles: &'a [[i32; 3]],

@@ -12,7 +12,7 @@ use crate::error::UnwrapError;
 use crate::mesh::{self, ConditionOptions, FaceId, Groups, MeshInput, Surface};
 use crate::packing::PackSettings;
 use crate::progress::{Cancelled, Progress, Stage};
-use crate::settings::{ChartScale, LimitOver, Settings};
+use crate::settings::{self, ChartScale, LimitOver, Settings};
 
 use super::memo::{self, Fingerprint, Kind, Memo, Run};
 use super::tally::Tally;
@@ -30,34 +30,40 @@ pub struct Analysis {
     positions: Vec<[f64; 3]>,
     corner_vertices: Vec<i32>,
     face_offsets: Vec<i32>,
-    weld: bool,
+    conditioning: ConditionOptions,
     prepared: Prepared,
     memo: Memo,
 }
 
 impl Analysis {
-    /// Copies the mesh and conditions it; `weld` as in [`Settings`]. O(n log n).
+    /// Copies the mesh and conditions it; `conditioning` as of the [`Settings`] it will be unwrapped with. O(n log n).
     ///
     /// # Errors
-    /// [`UnwrapError::Mesh`] if the arrays do not make a mesh; cancelled.
-    pub fn new(input: &MeshInput<'_>, weld: bool, progress: &Progress) -> Result<Self, UnwrapError> {
+    /// [`UnwrapError::Mesh`] if the arrays do not make a mesh; [`UnwrapError::Setting`] if the weld distance is negative or not
+    /// finite; cancelled.
+    pub fn new(
+        input: &MeshInput<'_>,
+        conditioning: &ConditionOptions,
+        progress: &Progress,
+    ) -> Result<Self, UnwrapError> {
         progress.check()?;
+        settings::check_weld_distance(conditioning.weld_distance)?;
         progress.enter(Stage::Condition);
-        let prepared = Prepared::new(input, weld, progress)?;
+        let prepared = Prepared::new(input, conditioning, progress)?;
         Ok(Self {
             memo: Memo::new(prepared.surface.mesh.face_count()),
             prepared,
             positions: input.positions.to_vec(),
             corner_vertices: input.corner_vertices.to_vec(),
             face_offsets: input.face_offsets.to_vec(),
-            weld,
+            conditioning: *conditioning,
         })
     }
 
-    /// Whether vertices at the same position count as one.
+    /// What the mesh was conditioned with.
     #[must_use]
-    pub fn weld(&self) -> bool {
-        self.weld
+    pub fn conditioning(&self) -> &ConditionOptions {
+        &self.conditioning
     }
 
     /// Number of faces of the mesh.
@@ -69,14 +75,19 @@ impl Analysis {
     /// As [`unwrap`](crate::unwrap()) of the mesh.
     ///
     /// # Errors
-    /// As there; also if `settings.weld` is not what the mesh was analysed with.
+    /// As there; also if `settings.weld` or, with it, `settings.weld_distance` is not what the mesh was analysed with.
     pub fn unwrap(&self, settings: &Settings, progress: &Progress) -> Result<Atlas, UnwrapError> {
         progress.check()?;
         settings.validate()?;
-        if settings.weld != self.weld {
+        let made_with = &self.conditioning;
+        if settings.weld != made_with.weld {
             let value = settings.weld.to_string();
-            let allowed = if self.weld { "true, as in the analysis" } else { "false, as in the analysis" };
+            let allowed = if made_with.weld { "true, as in the analysis" } else { "false, as in the analysis" };
             return Err(UnwrapError::Setting { name: "weld", value, allowed });
+        }
+        if settings.weld && settings.weld_distance != made_with.weld_distance {
+            let value = settings.weld_distance.map_or_else(|| "not given".into(), |d| d.to_string());
+            return Err(UnwrapError::Setting { name: "weld_distance", value, allowed: "what it was in the analysis" });
         }
         let input = MeshInput {
             positions: &self.positions,
@@ -126,8 +137,12 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    pub(super) fn new(input: &MeshInput<'_>, weld: bool, progress: &Progress) -> Result<Self, UnwrapError> {
-        let surface = mesh::condition(input, &ConditionOptions { weld }, progress)?;
+    pub(super) fn new(
+        input: &MeshInput<'_>,
+        conditioning: &ConditionOptions,
+        progress: &Progress,
+    ) -> Result<Self, UnwrapError> {
+        let surface = mesh::condition(input, conditioning, progress)?;
         let (label, count) = surface.mesh.components();
         Ok(Self { components: Groups::by_label(&label, count, FaceId::new), surface })
     }

@@ -50,7 +50,7 @@ pub(super) fn finish(
     mut clock: Clock,
     progress: &Run<'_>,
 ) -> Result<Atlas, UnwrapError> {
-    let arrays = Arrays::new(input, surface, settings.weld);
+    let arrays = Arrays::new(input, surface);
     let mut round = 0;
     loop {
         progress.enter(Stage::Pack);
@@ -149,17 +149,11 @@ struct Arrays<'a> {
 }
 
 impl<'a> Arrays<'a> {
-    /// `weld` as the surface was made with it, so that edges count as seams where it has them.
-    fn new(input: &MeshInput<'_>, surface: &'a Surface, weld: bool) -> Self {
+    /// With the vertices that stand for others in the surface, so that edges count as seams where it has them.
+    fn new(input: &MeshInput<'_>, surface: &'a Surface) -> Self {
         let corner_triangles = surface.corner.as_chunks().0;
-        let vertex = |c: u32| u32::try_from(input.corner_vertices[c as usize]).unwrap_or(0);
-        let mut triangles: Vec<[u32; 3]> = corner_triangles.iter().map(|c| c.map(vertex)).collect();
-        if weld {
-            let mut used = vec![false; input.positions.len()];
-            triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
-            let representative = mesh::weld(input.positions, &used);
-            triangles.iter_mut().flatten().for_each(|v| *v = representative[*v as usize]);
-        }
+        let vertex = |c: u32| surface.representative[input.corner_vertices[c as usize] as usize];
+        let triangles = corner_triangles.iter().map(|c| c.map(vertex)).collect();
         Self { positions: input.positions.iter().map(|&p| Point3::from(p)).collect(), triangles, corner_triangles }
     }
 
@@ -222,6 +216,12 @@ impl Layout {
                     layout.uv[surface.corner[h.index()] as usize] = uv[vertex.index()];
                 }
             }
+        }
+        for &[corner, with] in &surface.followers {
+            layout.uv[corner as usize] = layout.uv[with as usize];
+        }
+        for &[polygon, with] in &surface.absorbed {
+            layout.polygon_chart[polygon as usize] = layout.polygon_chart[with as usize];
         }
         Ok(layout)
     }

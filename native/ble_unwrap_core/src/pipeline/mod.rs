@@ -56,7 +56,7 @@ pub fn unwrap(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -
     settings.validate()?;
     let mut clock = Clock::new();
     progress.enter(Stage::Condition);
-    let prepared = Prepared::new(input, settings.weld, progress)?;
+    let prepared = Prepared::new(input, &settings.conditioning(), progress)?;
     clock.lap("condition");
     prepared.unwrap(input, settings, clock, &Run::new(progress, None))
 }

@@ -68,7 +68,7 @@ pub fn surface_distances(
     let count = sources.len().checked_mul(n).ok_or_else(too_large)?;
     let mut rows: Vec<f32> = Vec::new();
     rows.try_reserve_exact(count).map_err(|_| too_large())?;
-    let surface = mesh::condition(input, &ConditionOptions { weld: true }, progress)?;
+    let surface = mesh::condition(input, &ConditionOptions::default(), progress)?;
     let places = Places::new(input, &surface);
     rows.resize(count, f32::INFINITY);
     if rows.is_empty() {
@@ -114,9 +114,8 @@ struct Places(Vec<(u32, u32)>);
 impl Places {
     fn new(input: &MeshInput<'_>, surface: &Surface) -> Self {
         let vertex = |corner: u32| input.corner_vertices[corner as usize] as u32;
-        let mesh = &surface.mesh;
         let mut pairs: Vec<(u32, u32)> =
-            mesh.halfedges().map(|h| (vertex(surface.corner[h.index()]), mesh.from(h).index() as u32)).collect();
+            surface.places().into_iter().map(|(corner, v)| (vertex(corner), v.index() as u32)).collect();
         pairs.sort_unstable();
         pairs.dedup();
         Self(pairs)

@@ -10,7 +10,7 @@ use crate::embedding::{EmbeddingError, Model};
 use crate::error::UnwrapError;
 use crate::flattening::{Rung, Steps};
 use crate::geodesics::{self, LandmarkDistances};
-use crate::mesh::{self, ConditionOptions, MeshError, MeshInput, Surface, VertexId};
+use crate::mesh::{self, MeshError, MeshInput, Surface, VertexId};
 use crate::progress::{Cancelled, Progress, Stage};
 use crate::settings::{MOST_TOGETHER, Settings};
 use crate::stretch::{self, BOUNDARY_REACH, StretchError};
@@ -199,7 +199,7 @@ pub fn flatten(
     settings.validate()?;
     let mut clock = Clock::new();
     progress.enter(Stage::Condition);
-    let surface = mesh::condition(input, &ConditionOptions { weld: settings.weld }, progress)?;
+    let surface = mesh::condition(input, &settings.conditioning(), progress)?;
     let vertex = one_patch(input, &surface)?;
     clock.lap("condition");
 
@@ -283,8 +283,8 @@ fn one_patch(input: &MeshInput<'_>, surface: &Surface) -> Result<Vec<Option<Vert
         return Err(FlattenError::Closed);
     }
     let mut vertex = vec![None; input.positions.len()];
-    for h in mesh.halfedges() {
-        let (of, v) = (input.corner_vertices[surface.corner[h.index()] as usize] as usize, mesh.from(h));
+    for (corner, v) in surface.places() {
+        let of = input.corner_vertices[corner as usize] as usize;
         if vertex[of].replace(v).is_some_and(|other| other != v) {
             return Err(FlattenError::Pinched { vertex: of });
         }

@@ -53,8 +53,7 @@ pub struct LayoutMeasures {
 ///
 /// Faces are triangulated as [`unwrap`](crate::unwrap()) does it (with `input.corner_triangles` where they cover
 /// a face) and measured as [`metrics::measure`] says. Charts are found from the UVs; `chart` only tells
-/// which faces have any. Vertices are not welded: a mesh that is split along its seams has no seams left.
-/// O(n log n).
+/// which faces have any. Without `options.weld` a mesh that is split along its seams has no seams left. O(n log n).
 ///
 /// # Errors
 /// [`LayoutError`]: invalid arrays, wrong lengths, cancelled.
@@ -62,6 +61,7 @@ pub fn measure_layout(
     input: &MeshInput<'_>,
     uv: &[[f32; 2]],
     chart: Option<&[i32]>,
+    options: &ConditionOptions,
     texture: Texture,
     progress: &Progress,
 ) -> Result<LayoutMeasures, LayoutError> {
@@ -75,11 +75,11 @@ pub fn measure_layout(
     if let Some(found) = chart.map(<[i32]>::len).filter(|&found| found != faces) {
         return Err(LayoutError::ChartCount { found, faces });
     }
-    let surface = mesh::condition(input, &ConditionOptions { weld: false }, progress)?;
+    let surface = mesh::condition(input, options, progress)?;
     let positions: Vec<Point3<f64>> = input.positions.iter().map(|&p| Point3::from(p)).collect();
     let corner_triangles: Vec<[u32; 3]> = surface.corner.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
-    let triangles: Vec<[u32; 3]> =
-        corner_triangles.iter().map(|c| c.map(|c| input.corner_vertices[c as usize] as u32)).collect();
+    let vertex = |c: u32| surface.representative[input.corner_vertices[c as usize] as usize];
+    let triangles: Vec<[u32; 3]> = corner_triangles.iter().map(|c| c.map(vertex)).collect();
     let label: Vec<i32> =
         chart.map(|chart| surface.polygon.iter().map(|&p| chart[p as usize]).collect()).unwrap_or_default();
     progress.enter(Stage::Verify);
@@ -130,7 +130,8 @@ mod tests {
             face_offsets: &[0, 4, 8, 11],
             ..MeshInput::default()
         };
-        measure_layout(&input, uv, chart, Texture::square(100, 2.0), &Progress::new())
+        let split = ConditionOptions { weld: false, weld_distance: None };
+        measure_layout(&input, uv, chart, &split, Texture::square(100, 2.0), &Progress::new())
     }
 
     #[test]

@@ -71,12 +71,20 @@ class _EmbeddingSettings(_FitSettings, total=False):
     initial: Literal["mds", "random"]
 
 @type_check_only
-class _MeasureSettings(_Threads, total=False):
+class _WeldSettings(TypedDict, total=False):
+    weld: bool
+    weld_distance: float | None
+
+@type_check_only
+class _TextureSettings(_Threads, total=False):
     margin: float
     texture_size: int | tuple[int, int]
 
 @type_check_only
-class _PackSettings(_MeasureSettings, total=False):
+class _MeasureSettings(_TextureSettings, _WeldSettings, total=False): ...
+
+@type_check_only
+class _PackSettings(_TextureSettings, total=False):
     rotation: Literal["any", "quarter", "none"]
 
 @type_check_only
@@ -88,8 +96,7 @@ class _CloudSettings(_EmbeddingSettings, _PackSettings, total=False):
     landmark_max: int | None
 
 @type_check_only
-class _FlattenSettings(_GeodesicSettings, _EmbeddingSettings, total=False):
-    weld: bool
+class _FlattenSettings(_GeodesicSettings, _EmbeddingSettings, _WeldSettings, total=False):
     landmark_fraction: float
     landmark_min: int
     landmark_max: int | None
@@ -109,13 +116,14 @@ class _Settings(_FlattenSettings, _PackSettings, total=False):
     crease_weight: float
 
 @type_check_only
-class _AnalyseSettings(_Threads, total=False):
-    weld: bool
+class _AnalyseSettings(_Threads, _WeldSettings, total=False): ...
 
 @final
 class Analysis:
     @property
     def weld(self) -> bool: ...
+    @property
+    def weld_distance(self) -> float | None: ...
     def unwrap(self, *, job: Job | None = None, **settings: Unpack[_Settings]) -> Atlas: ...
     def submit_unwrap(self, *, job: Job | None = None, **settings: Unpack[_Settings]) -> Job: ...
 
