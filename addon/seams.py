@@ -1,6 +1,7 @@
 """Seams of a mesh: whose they are, and marking the borders of charts.
 
-Seams that we marked are remembered in an attribute of edges. They are no wish of the artist's: the next unwrap neither
+Seams that we marked are remembered in an attribute of edges, as integers: of booleans Python sees none in
+edit mode in Blender 4.2. They are no wish of the artist's: the next unwrap neither
 cuts nor follows them, and replaces them by its own. All others are the artist's and stay as they are.
 """
 
@@ -21,16 +22,16 @@ def remembered(mesh):
     """Edges that we marked and that the artist may have cleared since, (e,) bool; in either mode."""
     if mesh.is_editmode:
         edges = bmesh.from_edit_mesh(mesh).edges
-        layer = edges.layers.bool.get(OWN_SEAMS)
+        layer = edges.layers.int.get(OWN_SEAMS)
         if layer is not None:
-            return np.fromiter((edge[layer] for edge in edges), bool, len(edges))
+            return np.fromiter((edge[layer] != 0 for edge in edges), bool, len(edges))
     elif _is_ours(attribute := mesh.attributes.get(OWN_SEAMS)):
-        return read_array(attribute.data, "value", bool)
+        return read_array(attribute.data, "value", np.int32) != 0
     return np.zeros(len(mesh.edges), bool)
 
 
 def _is_ours(attribute):
-    return attribute is not None and (attribute.domain, attribute.data_type) == ("EDGE", "BOOLEAN")
+    return attribute is not None and (attribute.domain, attribute.data_type) == ("EDGE", "INT")
 
 
 def mark_chart_borders(mesh, uv, source_faces):
@@ -56,8 +57,8 @@ def _remember(mesh, ours):
     if not _is_ours(attribute):
         if attribute is not None:
             mesh.attributes.remove(attribute)
-        attribute = mesh.attributes.new(OWN_SEAMS, "BOOLEAN", "EDGE")
-    attribute.data.foreach_set("value", ours)
+        attribute = mesh.attributes.new(OWN_SEAMS, "INT", "EDGE")
+    attribute.data.foreach_set("value", ours.astype(np.int32))
 
 
 def _edges_of(mesh, faces):
