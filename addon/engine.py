@@ -242,7 +242,7 @@ def measure(selection, uv, *, texture_size, margin, weld=True):
 def overlaps_between(first, second):
     """Number of pairs of triangles that share area in UVs, one of each set of faces.
 
-    A set is (positions, corner_vertices, face_offsets, corner_triangles, uv). What overlaps within a set is not counted.
+    A set is (positions, corner_vertices, face_offsets, corner_triangles, uv). Overlaps within a set are not counted.
     """
     counts = [_overlaps(faces) for faces in (_together(first, second), first, second)]
     return max(counts[0] - counts[1] - counts[2], 0)
@@ -257,16 +257,10 @@ def _together(first, second):
 
 
 def _overlaps(faces):
-    positions, corner_vertices, face_offsets, corner_triangles, uv = (
-        np.ascontiguousarray(array, kind)
-        for array, kind in zip(faces, (np.float32, np.int32, np.int32, np.int32, np.float32), strict=True)
-    )
-    measured = _translated(
-        lambda module: module.measure(
-            positions, corner_vertices, face_offsets, uv, corner_triangles=corner_triangles, texture_size=1024, margin=0.0
-        )
-    )
-    return int(measured["overlaps"])
+    kinds = (np.float32, np.int32, np.int32, np.int32, np.float32)
+    *mesh, triangles, uv = (np.ascontiguousarray(array, kind) for array, kind in zip(faces, kinds, strict=True))
+    options = {"corner_triangles": triangles, "texture_size": 1024, "margin": 0.0}
+    return int(_translated(lambda module: module.measure(*mesh, uv, **options))["overlaps"])
 
 
 def certify(measured, *, margin, stretch_limit=None, limit_over="CHART", warnings=()):

@@ -346,8 +346,7 @@ def read_uvs(selection, target=ACTIVE_MAP):
     """UVs that the maps to write hold for the corners of the selection, (c, 2) float32; None where a map is missing."""
     meshes = [find_mesh(part) for part in selection.parts]
     maps = [
-        uv_maps.map_to_write(mesh, target, part.group_names)
-        for part, mesh in zip(selection.parts, meshes, strict=True)
+        uv_maps.map_to_write(mesh, target, part.group_names) for part, mesh in zip(selection.parts, meshes, strict=True)
     ]
     if not all(there for _, there in maps):
         return None

@@ -87,8 +87,8 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     texture_size: IntVectorProperty(
         name="Texture Size",
         description=(
-            "Width and height in pixels of the texture that the UVs are meant for: its proportions and, for the margin, "
-            "its resolution"
+            "Width and height in pixels of the texture that the UVs are meant for: its proportions and, for the "
+            "margin, its resolution"
         ),
         default=(2048, 2048),
         size=2,
@@ -113,8 +113,12 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         description="How charts may be turned to pack them tighter",
         items=(
             ("ANY", "Any", "Any angle: tightest"),
-            ("QUARTER", "Quarter Turns", "As they were flattened, at whatever angle, or turned from there by 90° or more"),
-            ("NONE", "None", "As they were flattened, at whatever angle"),
+            (
+                "QUARTER",
+                "Quarter Turns",
+                "By multiples of 90° from how they were flattened; not set upright",
+            ),
+            ("NONE", "None", "As they were flattened, at whatever angle that is"),
         ),
         default="ANY",
     )
@@ -144,8 +148,8 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     use_selection: BoolProperty(
         name="Only Selected",
         description=(
-            "In Edit Mode, unwrap the selected faces, or points of a cloud, and leave the others as they are; in the UV "
-            "Editor without Sync Selection, the faces selected there. Hidden ones are always left"
+            "In Edit Mode, unwrap the selected faces, or points of a cloud, and leave the others as they are; in the "
+            "UV Editor without Sync Selection, the faces selected there. Hidden ones are always left"
         ),
         default=True,
     )
@@ -167,7 +171,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     )
     uv_map_name: StringProperty(
         name="Name",
-        description="Name of the UV map and of a cloud's attribute; if other data has it, the next one that is free or ours",
+        description="Name of the UV map and of a cloud's attribute; if other data has it, a number is added",
         default="UVMap",
         maxlen=60,
     )

@@ -15,9 +15,9 @@ class Run:
     """Reads all objects when made, then computes (`run` or `start`), then writes (`write`).
 
     Surfaces share one atlas (`one_atlas=False`: have one each); a cloud has a texture to itself. With `keep`, the
-    analysis of the one atlas is kept for the next run. `by_uv` as in `faces.chosen_faces`. What has neither faces nor enough points is left out as long as
-    anything else is there, with a note where there are some points. Raises what the tasks raise; whenever it does,
-    nothing was changed.
+    analysis of the one atlas is kept for the next run. `by_uv` as in `faces.chosen_faces`. What has neither faces nor
+    enough points is left out as long as anything else is there, with a note where there are some points. Raises what
+    the tasks raise; whenever it does, nothing was changed.
     """
 
     def __init__(self, objects, settings, *, threads=0, one_atlas=True, keep=False, by_uv=False):

@@ -140,11 +140,12 @@ class UnwrapTask:
             except engine.EngineError as error:  # the UVs are written: say what is known
                 warnings.append(f"The written UVs could not be measured: {error}")
         if kept := mesh_bridge.kept_faces(self.selection, whole):
-            measured = {**measured, "overlaps_with_kept": self._overlaps(held, kept)}
-            if measured["overlaps_with_kept"]:
+            overlaps = self._overlaps(held, kept)
+            measured = {**measured, "overlaps_with_kept": overlaps}
+            if overlaps:
                 warnings.append(
-                    f"The new charts lie on faces that were kept, {engine.counted(measured['overlaps_with_kept'], 'pair')} "
-                    "of triangles: select those, too, or pack all charts afterwards (UV > Pack Islands)"
+                    f"New charts lie on faces that were kept, {engine.counted(overlaps, 'pair')} of triangles: select "
+                    "those faces, too, or pack all charts afterwards (UV > Pack Islands)"
                 )
         certificate = engine.certify(measured, margin=margin, warnings=warnings, **limit)
         seconds = self.timer.seconds()

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 
 from .. import last_result
-from ..mesh_arrays import crowded_edges
+from ..mesh_arrays import crowded_edges, read_array
 
 
 class MESH_OT_ble_unwrap_select_edges(bpy.types.Operator):
@@ -25,26 +25,30 @@ class MESH_OT_ble_unwrap_select_edges(bpy.types.Operator):
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         visible = [obj for obj in last_result.objects(context) if obj.type == "MESH" and obj.visible_get()]
-        found = [(obj, edges) for obj in visible if (edges := crowded_edges(obj.data)).any()]
+        found = {obj: shown for obj in visible if (shown := visible_crowded_edges(obj.data)).size}
         if not found:
-            self.report({"WARNING"}, "No visible mesh of the last result has an edge with more than two faces")
+            self.report({"WARNING"}, "Nothing that is visible has an edge with more than two faces")
             return {"CANCELLED"}
         for obj in context.view_layer.objects:
-            obj.select_set(any(obj == chosen for chosen, _ in found))
-        context.view_layer.objects.active = found[0][0]
+            obj.select_set(obj in found)
+        context.view_layer.objects.active = next(iter(found))
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.mesh.select_mode(type="EDGE")
-        bpy.ops.mesh.reveal(select=False)
         bpy.ops.mesh.select_all(action="DESELECT")
-        for obj, edges in found:
+        for obj, edges in found.items():
             edit_mesh = bmesh.from_edit_mesh(obj.data)
             edit_mesh.edges.ensure_lookup_table()
-            for index in np.flatnonzero(edges):
+            for index in edges:
                 edit_mesh.edges[index].select_set(True)
             bmesh.update_edit_mesh(obj.data, loop_triangles=False, destructive=False)
-        count = sum(int(edges.sum()) for _, edges in found)
+        count = sum(map(len, found.values()))
         self.report({"INFO"}, f"{count:,} edge{'' if count == 1 else 's'} selected")
         return {"FINISHED"}
+
+
+def visible_crowded_edges(mesh):
+    """Indices of the edges that more than two faces share and that edit mode would show."""
+    return np.flatnonzero(crowded_edges(mesh) & ~read_array(mesh.edges, "hide", bool))
 
 
 def register():

@@ -35,7 +35,9 @@ def test_a_preset_chosen_in_the_redo_panel_shows_what_will_run(addon):
         runs = {**properties.default_values(preset), **properties.values(operator)}
         shown = {name: getattr(operator, name) for name in properties.annotations()}
         shown["texture_size"] = tuple(shown["texture_size"])
-        assert {name: pytest.approx(value, rel=1e-6) if isinstance(value, float) else value for name, value in runs.items()} == shown
+        assert {
+            name: pytest.approx(value, rel=1e-6) if isinstance(value, float) else value for name, value in runs.items()
+        } == shown
         assert (operator.stretch_solver, operator.margin) == (solver, 9)
 
 
@@ -182,7 +184,7 @@ def test_one_is_singular(addon):
     many = {**measured, "charts": 1200, "faces": 2, "overlaps": 2, "flips": 2, "unmapped_faces": 2}
     certificate = engine.certify(many, margin=4)
     assert certificate.violations == ["2 overlapping pairs of faces", "2 flipped faces", "2 faces without UVs"]
-    assert [text for _, text in engine.lines(certificate, margin=4, stretch_limit=1.1)][0] == "2 faces in 1,200 charts"
+    assert engine.lines(certificate, margin=4, stretch_limit=1.1)[0] == ("INFO", "2 faces in 1,200 charts")
 
 
 def book(name="Book", pages=3):
@@ -219,6 +221,4 @@ def test_no_edges_to_select_where_there_are_none():
     unwrap()
     assert bpy.context.window_manager.ble_unwrap_certificate.crowded == 0
     assert uvs(bpy.data.objects["Grid"]).any()
-    with pytest.raises(RuntimeError, match="no edge|No visible mesh"):
-        if bpy.ops.mesh.ble_unwrap_select_edges() == {"CANCELLED"}:
-            raise RuntimeError("no edge")
+    assert bpy.ops.mesh.ble_unwrap_select_edges() == {"CANCELLED"}
