@@ -2,7 +2,6 @@
 
 from contextlib import contextmanager
 
-import bmesh
 import bpy
 import numpy as np
 
@@ -66,7 +65,6 @@ def object_mode(meshes):
         raise MeshError("The mesh is in edit mode in another scene or view layer; leave it there first")
     if active not in editing:
         view_layer.objects.active = editing[0]
-    picked = [(obj, _picked(obj.data)) for obj in editing]
     bpy.ops.object.mode_set(mode="OBJECT")
     try:
         yield
@@ -82,31 +80,3 @@ def object_mode(meshes):
         for obj, state in selected.items():
             obj.select_set(state)
         view_layer.objects.active = active
-        for obj, what in picked:
-            _pick_again(obj.data, *what)
-
-
-def _picked(mesh):
-    """The order in which elements were selected, and the active face; edit mode forgets it when it is left."""
-    edit_mesh = bmesh.from_edit_mesh(mesh)
-    for elements in (edit_mesh.verts, edit_mesh.edges, edit_mesh.faces):
-        elements.index_update()
-    active = edit_mesh.faces.active
-    history = [(type(element), element.index) for element in edit_mesh.select_history]
-    return history, None if active is None else active.index
-
-
-def _pick_again(mesh, history, active_face):
-    edit_mesh = bmesh.from_edit_mesh(mesh)
-    elements = {
-        bmesh.types.BMVert: edit_mesh.verts,
-        bmesh.types.BMEdge: edit_mesh.edges,
-        bmesh.types.BMFace: edit_mesh.faces,
-    }
-    for sequence in elements.values():
-        sequence.ensure_lookup_table()
-    edit_mesh.select_history.clear()
-    for kind, index in history:
-        edit_mesh.select_history.add(elements[kind][index])
-    if active_face is not None:
-        edit_mesh.faces.active = edit_mesh.faces[active_face]

@@ -218,8 +218,8 @@ def test_selection_history_and_active_face_are_kept():
     edit_mesh.faces.active = edit_mesh.faces[5]
     unwrap()
     edit_mesh = bmesh.from_edit_mesh(obj.data)
-    history = [(type(element).__name__, element.index) for element in edit_mesh.select_history]
-    assert history == [("BMVert", 7), ("BMFace", 2), ("BMVert", 3)]
+    picked = [edit_mesh.select_history[number] for number in range(len(edit_mesh.select_history))]
+    assert [(type(element).__name__, element.index) for element in picked] == [("BMVert", 7), ("BMFace", 2), ("BMVert", 3)]
     assert edit_mesh.faces.active.index == 5
 
 
