@@ -310,10 +310,10 @@ def _overlaps_text(measured):
     return f"{overlaps}, {kept or 'none'} with faces that were kept"
 
 
-def lines(certificate, *, margin, stretch_limit, limit_over="CHART", length_text="{:.4g}".format):
+def lines(certificate, *, margin, stretch_limit, limit_over="CHART", notes=(), length_text="{:.4g}".format):
     """The certificate for display: (status, text), status one of OK, BAD, WARN, INFO.
 
-    `length_text` writes a length of the scene with its unit.
+    `notes` say what was done besides; `length_text` writes a length of the scene with its unit.
     """
     measured = certificate.measured
     charts = int(measured.get("charts") or 0)
@@ -337,7 +337,7 @@ def lines(certificate, *, margin, stretch_limit, limit_over="CHART", length_text
     result.append(("INFO", f"{100 * float(measured.get('packing_efficiency') or 0):.1f}% of the texture used"))
     if measured.get("seam_length_absolute") is not None:
         result.append(("INFO", f"Seams {length_text(float(measured['seam_length_absolute']))} long"))
-    return result + [("WARN", text) for text in certificate.warnings]
+    return result + [("INFO", text) for text in notes] + [("WARN", text) for text in certificate.warnings]
 
 
 def counted(number, word):

@@ -8,7 +8,7 @@ from . import last_result, properties, targets
 
 CATEGORY = "BLE Unwrap"
 STATUS_ICONS = {"HEAD": "DOT", "OK": "CHECKMARK", "BAD": "ERROR", "WARN": "INFO", "INFO": "BLANK1"}
-WARNING_CHARACTERS = 34  # of a line of the panel at its usual width
+LINE_CHARACTERS = 36  # of a line of the panel at its usual width
 
 
 def draw_settings(layout, context, names):
@@ -96,7 +96,7 @@ def wrapped(text):
     """A text in lines that fit the panel."""
     lines, line = [], ""
     for word in text.split():
-        if line and len(line) + 1 + len(word) > WARNING_CHARACTERS:
+        if line and len(line) + 1 + len(word) > LINE_CHARACTERS:
             lines.append(line)
             line = word
         else:

@@ -155,10 +155,7 @@ class UnwrapTask:
             report=result.report,
             seconds=seconds,
             summary=engine.summary(measured, seconds),
-            lines=[
-                *engine.lines(certificate, margin=margin, **limit, length_text=units.length_text),
-                *(("INFO", note) for note in self.notes),
-            ],
+            lines=engine.lines(certificate, margin=margin, **limit, notes=self.notes, length_text=units.length_text),
             maps=mesh_bridge.active_maps(self.selection),
         )
 

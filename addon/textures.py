@@ -86,8 +86,8 @@ def replaced_note(obj, map_name):
     others = f" and {more} more" if more else ""
     moved = ", and its Mapping node moves it" if any(use.moved for use in uses) else ""
     return (
-        f"{obj.name}: {map_name} was replaced, by which material {first.material.name} places {first.image.name}"
-        f"{others}{moved}: what was painted no longer fits. To keep the old layout, write another UV map by name"
+        f"{obj.name}: {map_name} was replaced, which material {first.material.name} uses for {first.image.name}{others}"
+        f"{moved}. What was painted no longer fits; to keep its layout, write another UV map by name"
     )
 
 

@@ -219,7 +219,8 @@ def test_selection_history_and_active_face_are_kept():
     unwrap()
     edit_mesh = bmesh.from_edit_mesh(obj.data)
     picked = [edit_mesh.select_history[number] for number in range(len(edit_mesh.select_history))]
-    assert [(type(element).__name__, element.index) for element in picked] == [("BMVert", 7), ("BMFace", 2), ("BMVert", 3)]
+    found = [(type(element).__name__, element.index) for element in picked]
+    assert found == [("BMVert", 7), ("BMFace", 2), ("BMVert", 3)]
     assert edit_mesh.faces.active.index == 5
 
 
@@ -403,7 +404,7 @@ def test_replacing_the_map_of_a_texture_is_told(mapping, uv_map):
     textured(obj, (64, 64), mapping=mapping, uv_map=uv_map)
     unwrap()
     (text,) = warnings()
-    assert text.startswith("Cube: UVMap was replaced, by which material Wood places Wood.png")
+    assert text.startswith("Cube: UVMap was replaced, which material Wood uses for Wood.png")
     assert ("Mapping node" in text) is mapping
     unwrap(uv_map="NEW", uv_map_name="baked")
     assert not warnings(), "another map: the texture keeps its own"
