@@ -145,7 +145,7 @@ class UnwrapTask:
             if overlaps:
                 warnings.append(
                     f"New charts lie on faces that were kept, {engine.counted(overlaps, 'pair')} of triangles: select "
-                    "those faces, too, or pack all charts afterwards (UV > Pack Islands)"
+                    "those faces, too, turn on Keep Place, or pack all charts afterwards (UV > Pack Islands)"
                 )
         certificate = engine.certify(measured, margin=margin, warnings=warnings, **limit)
         seconds = self.timer.seconds()

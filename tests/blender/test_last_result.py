@@ -158,7 +158,7 @@ def test_another_file_has_no_result(addon):
     [
         ("METRIC", 1.0, 2.0, " m"),
         ("METRIC", 1.0, 2e-6, " µm"),
-        ("METRIC", 0.001, 2.0, " mm"),
+        ("METRIC", 0.001, 2.0, " cm"),
         ("IMPERIAL", 1.0, 2.0, "'"),
         ("NONE", 1.0, 2.0, " units"),
     ],
