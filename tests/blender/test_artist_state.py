@@ -322,7 +322,8 @@ def textured(obj, size, *, name="Wood", mapping=False, uv_map=None, generated=Fa
         image.pixels[0] = 0.25  # painted upon: not a test pattern
         image.update()
     material = bpy.data.materials.new(name)
-    material.use_nodes = True
+    if material.node_tree is None:  # until 5.0
+        material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     texture = nodes.new("ShaderNodeTexImage")
     texture.image = image
