@@ -133,12 +133,12 @@ def edited_meshes(cloud):
     return [find_data(cloud)] if cloud.is_mesh else []
 
 
-def check(cloud, *, make_new=False, map_name=DEFAULT_NAME):
+def check(cloud, *, map_name=DEFAULT_NAME):
     """Raises `MeshError` where the data is gone or edited, or no name is left for the attribute."""
-    attribute_to_write(find_data(cloud), map_name, make_new, cloud.taken_names)
+    attribute_to_write(find_data(cloud), map_name, False, cloud.taken_names)
 
 
-def write_uvs(cloud, uv, *, make_new=False, map_name=DEFAULT_NAME):
+def write_uvs(cloud, uv, *, map_name=DEFAULT_NAME):
     """Writes one UV per point, and returns what the data holds afterwards, (n, 2) float32, with the attribute's name.
 
     Only the points of the cloud are written. Nothing is changed when the data is gone or edited.
@@ -146,7 +146,7 @@ def write_uvs(cloud, uv, *, make_new=False, map_name=DEFAULT_NAME):
     uv = np.ascontiguousarray(uv, np.float32)
     data = find_data(cloud)
     with mesh_bridge.object_mode(edited_meshes(cloud)):
-        name = attribute_to_write(data, map_name, make_new, cloud.taken_names)
+        name = attribute_to_write(data, map_name, False, cloud.taken_names)
         made = data.attributes.get(name) is None
         if made:
             name = add_attribute(data, name, cloud.object_name)

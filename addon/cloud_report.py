@@ -1,6 +1,6 @@
 """Judging the map of a cloud: a certificate, one line, and the lines of the panel. For surfaces, see engine.py."""
 
-from .engine import STRETCH_SLACK, Certificate, number_text
+from .engine import STRETCH_SLACK, Certificate, counted, number_text
 
 
 def measured(result, written, held):
@@ -37,12 +37,12 @@ def summary(found, seconds=None):
     """One line about the map of a cloud."""
     parts = [
         points_text(found["points"]),
-        _counted(found.get("charts"), "chart"),
+        counted(found.get("charts"), "chart"),
         f"stretch {number_text(found.get('l2'))} (worst chart {number_text(found.get('l2_worst_chart'))})",
     ]
     for key, word in (("overlaps", "overlap"), ("folded_points", "folded point")):
         if found.get(key):
-            parts.append(_counted(found[key], word))
+            parts.append(counted(found[key], word))
     if found["points_unmapped"]:
         parts.append(f"{points_text(found['points_unmapped'])} without UVs")
     parts.append(f"{100 * float(found.get('packing_efficiency') or 0):.0f}% used")
@@ -57,7 +57,7 @@ def lines(certificate, *, stretch_limit, attribute):
     worst = found.get("l2_worst_chart")
     stretch_ok = worst is not None and worst <= stretch_limit + STRETCH_SLACK
     without = found["points_lost"] + found["points_unmapped"]
-    pieces, charts = _counted(found.get("pieces"), "piece"), _counted(found.get("charts"), "chart")
+    pieces, charts = counted(found.get("pieces"), "piece"), counted(found.get("charts"), "chart")
     result = [
         ("INFO", f"{points_text(found['points'])}, {pieces}, {charts}"),
         ("OK" if stretch_ok else "BAD", f"Stretch {number_text(found.get('l2'))}, worst chart {number_text(worst)}"),
@@ -71,9 +71,4 @@ def lines(certificate, *, stretch_limit, attribute):
 
 
 def points_text(count):
-    return _counted(count, "point")
-
-
-def _counted(count, word):
-    count = int(count or 0)
-    return f"{count:,} {word}{'' if count == 1 else 's'}"
+    return counted(count, "point")

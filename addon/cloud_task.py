@@ -1,5 +1,6 @@
 """One cloud, from points to certificate; the counterpart of task.py, with the same steps."""
 
+import bpy
 import numpy as np
 
 from . import cloud_bridge, cloud_report, engine, properties
@@ -15,8 +16,8 @@ class CloudTask:
     def __init__(self, cloud, settings, *, threads=0):
         self.cloud = cloud
         self.settings = {**properties.default_values(settings.get("preset", "DEFAULT")), **settings}
-        self.make_new = self.settings["uv_map"] == "NEW"
         self.native = properties.native_values(settings, properties.SURFACE_SETTINGS)
+        self.native |= {name: self.settings[name] for name in properties.KEPT_BY_PRESETS}
         self.native["threads"] = threads
         self.bounds = None
         if self.settings["use_original_bounds"]:
@@ -36,6 +37,10 @@ class CloudTask:
         return self.cloud.title
 
     @property
+    def written(self):
+        return [bpy.data.objects[self.cloud.object_name]]
+
+    @property
     def element_count(self):
         return len(self.cloud.positions)
 
@@ -51,7 +56,7 @@ class CloudTask:
 
     def check(self):
         """Raises `mesh_bridge.MeshError` where `write` would."""
-        cloud_bridge.check(self.cloud, make_new=self.make_new, map_name=self.settings["uv_map_name"])
+        cloud_bridge.check(self.cloud, map_name=self.settings["uv_map_name"])
 
     def write(self, result, *, measure_again=True):
         """Writes a result to the points and judges what they hold afterwards. Unmapped points are put at (0, 0)."""
@@ -60,11 +65,9 @@ class CloudTask:
         mapped = (result.chart >= 0)[:, None]
         uv = np.where(mapped, result.uv, np.float32(0))
         uv = np.where(mapped, placed(uv, self.bounds), np.float32(0))
-        held, attribute = cloud_bridge.write_uvs(
-            self.cloud, uv, make_new=self.make_new, map_name=self.settings["uv_map_name"]
-        )
+        held, attribute = cloud_bridge.write_uvs(self.cloud, uv, map_name=self.settings["uv_map_name"])
         warnings = [*self.cloud.warnings, *(f"{self.title}: {text}" for text in result.report.get("warnings", ()))]
-        if attribute != (self.settings["uv_map_name"] or cloud_bridge.DEFAULT_NAME) and not self.make_new:
+        if attribute != (self.settings["uv_map_name"] or cloud_bridge.DEFAULT_NAME):
             warnings.append(f"{self.title}: its UVs are in {attribute}, since the name was taken by other data")
         limit = self.settings["stretch_limit"]
         found = cloud_report.measured(result, uv, held)

@@ -3,10 +3,10 @@
 import math
 import time
 
-import bmesh
 import bpy
 
-from . import engine, mesh_bridge, properties
+from . import engine, mesh_bridge, properties, textures
+from .faces import uv_selected_faces
 from .task import unwrap_objects
 
 BLE_MAP = "BLE Unwrap"
@@ -76,8 +76,12 @@ def compare(objects, settings, *, angles=ANGLES, threads=0, progress=None):
         "uv_map": "ACTIVE",
         "use_original_bounds": False,
     }
-    target = {"margin": settings["margin"], "texture_size": settings["texture_size"]}
     objects = mesh_bridge.unique_meshes(objects)
+    if settings["correct_aspect"]:
+        # By the images of the maps that are there: the new ones, which both layouts come into, have none.
+        maps = [layer.name if (layer := obj.data.uv_layers.active) else None for obj in objects]
+        settings["texture_size"], _ = textures.proportioned_size(objects, maps, settings["texture_size"])
+    target = {"margin": settings["margin"], "texture_size": settings["texture_size"]}
     activate_map(objects, BLE_MAP)
     outcome = unwrap_objects(objects, settings, threads=threads, progress=progress)
     rows = {"ble_unwrap": {**outcome.certificate.measured, "seconds_total": outcome.seconds}}
@@ -123,17 +127,9 @@ def overlapping_faces(objects):
         try:
             bpy.ops.uv.select_all(action="DESELECT")
             bpy.ops.uv.select_overlap(extend=False)
-            return sum(_selected_uv_faces(obj.data) for obj in objects)
+            return sum(int(uv_selected_faces(obj.data).sum()) for obj in objects)
         finally:
             tools.use_uv_select_sync = before
-
-
-def _selected_uv_faces(mesh):
-    edit_mesh = bmesh.from_edit_mesh(mesh)
-    if hasattr(bmesh.types.BMFace, "uv_select"):  # 5.0 and later
-        return sum(face.uv_select for face in edit_mesh.faces)
-    layer = edit_mesh.loops.layers.uv.verify()
-    return sum(all(loop[layer].select for loop in face.loops) for face in edit_mesh.faces)
 
 
 class _everything_selected:

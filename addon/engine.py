@@ -224,15 +224,39 @@ def measure(selection, uv, *, texture_size, margin, weld=True, weld_distance=0.0
     )
 
 
+def overlaps_between(first, second):
+    """Number of pairs of triangles that share area in UVs, one of each set of faces.
+
+    A set is (positions, corner_vertices, face_offsets, corner_triangles, uv). Overlaps within a set are not counted.
+    """
+    counts = [_overlaps(faces) for faces in (_together(first, second), first, second)]
+    return max(counts[0] - counts[1] - counts[2], 0)
+
+
+def _together(first, second):
+    vertices, corners = len(first[0]), len(first[1])
+    bases = (0, vertices, 0, corners, 0)
+    joined = [np.concatenate([a, b + base]) for a, b, base in zip(first, second, bases, strict=True)]
+    joined[2] = np.concatenate([first[2], second[2][1:] + corners])
+    return joined
+
+
+def _overlaps(faces):
+    kinds = (np.float32, np.int32, np.int32, np.int32, np.float32)
+    *mesh, triangles, uv = (np.ascontiguousarray(array, kind) for array, kind in zip(faces, kinds, strict=True))
+    options = {"corner_triangles": triangles, "texture_size": 1024, "margin": 0.0}
+    return int(_translated(lambda module: module.measure(*mesh, uv, **options))["overlaps"])
+
+
 def certify(measured, *, margin, stretch_limit=None, limit_over="CHART", warnings=()):
     """Judges a measurement against what was promised."""
     certificate = Certificate(measured, warnings=list(warnings))
     if measured.get("overlaps"):
-        certificate.violations.append(f"{measured['overlaps']} overlapping pairs of faces")
+        certificate.violations.append(counted(measured["overlaps"], "overlapping pair") + " of faces")
     if measured.get("flips"):
-        certificate.violations.append(f"{measured['flips']} flipped faces")
+        certificate.violations.append(counted(measured["flips"], "flipped face"))
     if measured.get("unmapped_faces"):
-        certificate.violations.append(f"{measured['unmapped_faces']} faces without UVs")
+        certificate.violations.append(counted(measured["unmapped_faces"], "face") + " without UVs")
     gap = measured.get("gap_texels")
     if gap is not None and np.isfinite(gap) and measured.get("charts", 0) > 1 and gap < margin - MARGIN_SLACK_TEXELS:
         certificate.violations.append(f"charts {gap:.2f} px apart, margin is {margin:g} px")
@@ -251,12 +275,11 @@ def _limited(measured, limit_over):
 
 def summary(measured, seconds=None):
     """One line about a measurement."""
-    charts, overlaps, flips = (int(measured.get(key) or 0) for key in ("charts", "overlaps", "flips"))
     parts = [
-        f"{charts} chart{'' if charts == 1 else 's'}",
+        counted(measured.get("charts"), "chart"),
         f"stretch {number_text(measured.get('l2'))} (worst chart {number_text(measured.get('l2_worst_chart'))})",
-        f"{overlaps} overlap{'' if overlaps == 1 else 's'}",
-        f"{flips} flip{'' if flips == 1 else 's'}",
+        _overlaps_text(measured),
+        counted(measured.get("flips"), "flip"),
         f"{100 * float(measured.get('packing_efficiency') or 0):.0f}% used",
     ]
     if seconds is not None:
@@ -264,8 +287,19 @@ def summary(measured, seconds=None):
     return ", ".join(parts)
 
 
-def lines(certificate, *, margin, stretch_limit, limit_over="CHART"):
-    """The certificate for display: (status, text), status one of OK, BAD, WARN, INFO."""
+def _overlaps_text(measured):
+    """The overlaps, also with faces that were not unwrapped: of these there is no promise, so they are always told."""
+    overlaps, kept = counted(measured.get("overlaps"), "overlap"), measured.get("overlaps_with_kept")
+    if kept is None:
+        return overlaps
+    return f"{overlaps}, {f'{kept:,}' if kept else 'none'} with faces that were kept"
+
+
+def lines(certificate, *, margin, stretch_limit, limit_over="CHART", notes=(), length_text="{:.4g}".format):
+    """The certificate for display: (status, text), status one of OK, BAD, WARN, INFO.
+
+    `notes` say what was done besides; `length_text` writes a length of the scene with its unit.
+    """
     measured = certificate.measured
     charts = int(measured.get("charts") or 0)
     worst, gap = measured.get("l2_worst_chart"), measured.get("gap_texels")
@@ -273,21 +307,28 @@ def lines(certificate, *, margin, stretch_limit, limit_over="CHART"):
     stretch_ok = limited is not None and limited <= stretch_limit + STRETCH_SLACK
     gap_ok = charts < 2 or gap is None or gap >= margin - MARGIN_SLACK_TEXELS
     overlaps, flips, unmapped = (int(measured.get(key) or 0) for key in ("overlaps", "flips", "unmapped_faces"))
+    with_kept = measured.get("overlaps_with_kept")
     result = [
-        ("INFO", f"{int(measured.get('faces') or 0):,} faces in {charts:,} charts"),
+        ("INFO", f"{counted(measured.get('faces'), 'face')} in {counted(charts, 'chart')}"),
         ("OK" if stretch_ok else "BAD", f"Stretch {number_text(measured.get('l2'))}, worst chart {number_text(worst)}"),
-        ("BAD" if overlaps else "OK", f"{overlaps} overlaps"),
-        ("BAD" if flips else "OK", f"{flips} flipped faces"),
+        ("BAD" if overlaps else "WARN" if with_kept else "OK", _overlaps_text(measured)),
+        ("BAD" if flips else "OK", counted(flips, "flipped face")),
     ]
     if charts > 1 and gap is not None:
         least = "≥ " if gap >= max(SEARCHED_TEXELS, 2 * margin) else ""
-        result.append(("OK" if gap_ok else "BAD", f"Charts {least}{gap:.1f} px apart (margin {margin:g})"))
+        result.append(("OK" if gap_ok else "BAD", f"Charts {least}{gap:.1f} px apart (margin {margin:g} px)"))
     if unmapped:
-        result.append(("BAD", f"{unmapped} faces without UVs"))
+        result.append(("BAD", f"{counted(unmapped, 'face')} without UVs"))
     result.append(("INFO", f"{100 * float(measured.get('packing_efficiency') or 0):.1f}% of the texture used"))
     if measured.get("seam_length_absolute") is not None:
-        result.append(("INFO", f"Seams {float(measured['seam_length_absolute']):.4g} long"))
-    return result + [("WARN", text) for text in certificate.warnings]
+        result.append(("INFO", f"Seams {length_text(float(measured['seam_length_absolute']))} long"))
+    return result + [("INFO", text) for text in notes] + [("WARN", text) for text in certificate.warnings]
+
+
+def counted(number, word):
+    """A number, by thousands, and what it counts, in the plural where it is not one."""
+    number = int(number or 0)
+    return f"{number:,} {word}{'' if number == 1 else 's'}"
 
 
 def number_text(value):

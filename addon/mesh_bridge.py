@@ -1,28 +1,32 @@
-"""Blender's meshes to flat arrays, and UVs back: the only file that touches mesh data; cloud_bridge.py builds upon it
-for points without faces.
+"""Blender's meshes to flat arrays, and UVs back; cloud_bridge.py builds upon it for points without faces.
 
-Everything crosses in bulk (`foreach_get`, `foreach_set`); no loop runs over elements. Reading changes nothing.
-Writing happens in one go at the end, and only on meshes that are still as they were read.
+What can crosses in bulk (`foreach_get`, `foreach_set`); what Blender keeps for edit mode alone is asked for element by
+element. Reading changes nothing. Writing happens in one go at the end, and only on meshes that are still as they were
+read.
 """
 
 import hashlib
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
 
+from . import seams, uv_maps
+from .faces import chosen_faces
+from .mesh_arrays import (
+    MeshError,
+    NothingToUnwrap,
+    object_mode,
+    read_array,
+    read_corner_vertices,
+    read_face_offsets,
+    read_positions,
+    renumber,
+)
+
 MARKS = ("seams", "sharp", "materials")  # what an artist marks edges by
-MAX_UV_MAPS = 8  # Blender's own limit
+ACTIVE_MAP = uv_maps.MapChoice()
 SCALE_TOLERANCE = 1e-3  # relative difference of an object's axes from which its scale counts as non-uniform
-
-
-class MeshError(Exception):
-    """The selection cannot be unwrapped, or not any more; the text is for the user."""
-
-
-class NothingToUnwrap(MeshError):
-    """There is no face, or none is selected."""
 
 
 @dataclass
@@ -36,6 +40,7 @@ class MeshPart:
     faces: slice  # of the concatenated faces
     source_corners: np.ndarray | None  # corner indices in the mesh; None: all
     source_faces: np.ndarray | None  # face indices in the mesh; None: all
+    group_names: frozenset  # of vertex groups, with which UV maps share their names
     fingerprint: bytes
 
 
@@ -76,22 +81,29 @@ def unique_meshes(objects):
     return result
 
 
-def gather(objects, *, only_selected=False, make_new_map=False):
+def gather(objects, *, only_selected=False, by_uv=False, target=ACTIVE_MAP, move_pinned=True):
     """Reads the objects' base meshes (before modifiers and shape keys) as one `Selection`.
 
-    Positions are scaled as the objects are in the scene, so that all share one texel density. With `only_selected`,
-    only faces selected in edit mode are read. Raises `MeshError` where nothing can be unwrapped or written.
+    `only_selected` and `by_uv` as in `chosen_faces`; they matter for objects in edit mode. `target` is the UV map that
+    will be written. Raises `MeshError` where it cannot be, or where pinned UVs would be moved and may not be.
     """
-    warnings, parts, blocks = [], [], []
+    warnings, parts, blocks, reasons = [], [], [], []
     vertex_base = corner_base = face_base = 0
     for obj in objects:
         mesh = obj.data
-        check_writable(obj, make_new_map)
+        uv_maps.check_writable(obj, target)
         if obj.mode == "EDIT":
             obj.update_from_editmode()
-        block = read_mesh(mesh, only_selected and obj.mode == "EDIT")
-        if block is None:
+        if not mesh.polygons:
             continue
+        try:
+            chosen = chosen_faces(obj, only_selected=only_selected, by_uv=by_uv)
+        except NothingToUnwrap as error:
+            reasons.append(error)
+            continue
+        block = read_mesh(mesh, chosen)
+        if not move_pinned:
+            uv_maps.check_pins(obj, target, block["source_corners"])
         positions, note = scale_as_in_scene(block["positions"], obj.matrix_world)
         if note:
             warnings.append(f"{obj.name}: {note}")
@@ -105,6 +117,7 @@ def gather(objects, *, only_selected=False, make_new_map=False):
                 faces=slice(face_base, face_base + face_count),
                 source_corners=block["source_corners"],
                 source_faces=block["source_faces"],
+                group_names=uv_maps.group_names(obj),
                 fingerprint=fingerprint(mesh),
             )
         )
@@ -121,8 +134,7 @@ def gather(objects, *, only_selected=False, make_new_map=False):
         corner_base += corner_count
         face_base += face_count
     if not parts:
-        chosen = only_selected and any(obj.mode == "EDIT" and obj.data.polygons for obj in objects)
-        raise NothingToUnwrap("No faces are selected" if chosen else "There are no faces to unwrap")
+        raise reasons[0] if reasons else NothingToUnwrap("There are no faces to unwrap")
     if max(vertex_base, corner_base) > np.iinfo(np.int32).max:
         raise MeshError("The selection is too large: more than two thousand million corners")
     positions, corner_vertices, sizes, triangles, *marks = (
@@ -141,45 +153,8 @@ def gather(objects, *, only_selected=False, make_new_map=False):
     )
 
 
-def check_writable(obj, make_new_map):
-    """Raises `MeshError` where a UV map could not be written, before any time is spent."""
-    mesh = obj.data
-    if not mesh.is_editable:
-        raise MeshError(f"{obj.name}: its mesh is linked from another file and cannot be changed")
-    if make_new_map and len(mesh.uv_layers) >= MAX_UV_MAPS:
-        raise MeshError(f"{obj.name}: has {MAX_UV_MAPS} UV maps already, the most Blender allows; write the active one")
-
-
-def read_array(collection, attribute, dtype, width=1):
-    """One attribute of all elements as an array, (n,) or (n, width)."""
-    values = np.empty(len(collection) * width, dtype)
-    collection.foreach_get(attribute, values)
-    return values.reshape(-1, width) if width > 1 else values
-
-
-def read_positions(mesh):
-    attribute = mesh.attributes.get("position")
-    if attribute is not None and len(attribute.data) == len(mesh.vertices):
-        return read_array(attribute.data, "vector", np.float32, 3)
-    return read_array(mesh.vertices, "co", np.float32, 3)
-
-
-def read_corner_vertices(mesh):
-    attribute = mesh.attributes.get(".corner_vert")  # ten times as fast as asking the loops
-    if attribute is not None and len(attribute.data) == len(mesh.loops):
-        return read_array(attribute.data, "value", np.int32)
-    return read_array(mesh.loops, "vertex_index", np.int32)
-
-
-def read_face_offsets(mesh):
-    starts = read_array(mesh.polygons, "loop_start", np.int32)
-    return np.append(starts, np.int32(len(mesh.loops)))
-
-
-def read_mesh(mesh, only_selected):
-    """Arrays of one mesh, compacted to its selected faces where asked; None where no face is left."""
-    if not mesh.polygons:
-        return None
+def read_mesh(mesh, chosen):
+    """Arrays of one mesh, compacted to the chosen faces, (f,) bool; None: all."""
     positions = read_positions(mesh)
     corner_vertices = read_corner_vertices(mesh)
     offsets = read_face_offsets(mesh)
@@ -188,24 +163,20 @@ def read_mesh(mesh, only_selected):
     mesh.calc_loop_triangles()
     triangles = read_array(mesh.loop_triangles, "loops", np.int32, 3)
     source_faces = source_corners = None
-    if only_selected:
-        chosen = read_array(mesh.polygons, "select", bool)
-        if not chosen.any():
-            return None
-        if not chosen.all():
-            source_faces = np.flatnonzero(chosen).astype(np.int32)
-            corner_chosen = np.repeat(chosen, sizes)
-            source_corners = np.flatnonzero(corner_chosen).astype(np.int32)
-            triangles = renumber(triangles[corner_chosen[triangles[:, 0]]], corner_chosen)
-            corner_vertices = corner_vertices[source_corners]
-            vertex_chosen = np.zeros(len(positions), bool)
-            vertex_chosen[corner_vertices] = True
-            corner_vertices = renumber(corner_vertices, vertex_chosen)
-            marks = {
-                kind: renumber(edges[vertex_chosen[edges].all(axis=1)], vertex_chosen) for kind, edges in marks.items()
-            }
-            positions = positions[vertex_chosen]
-            sizes = sizes[source_faces]
+    if chosen is not None:
+        source_faces = np.flatnonzero(chosen).astype(np.int32)
+        corner_chosen = np.repeat(chosen, sizes)
+        source_corners = np.flatnonzero(corner_chosen).astype(np.int32)
+        triangles = renumber(triangles[corner_chosen[triangles[:, 0]]], corner_chosen)
+        corner_vertices = corner_vertices[source_corners]
+        vertex_chosen = np.zeros(len(positions), bool)
+        vertex_chosen[corner_vertices] = True
+        corner_vertices = renumber(corner_vertices, vertex_chosen)
+        marks = {
+            kind: renumber(edges[vertex_chosen[edges].all(axis=1)], vertex_chosen) for kind, edges in marks.items()
+        }
+        positions = positions[vertex_chosen]
+        sizes = sizes[source_faces]
     return {
         "positions": positions,
         "corner_vertices": corner_vertices,
@@ -218,10 +189,10 @@ def read_mesh(mesh, only_selected):
 
 
 def read_marks(mesh, face_sizes):
-    """The edges of each kind in `MARKS` as pairs of vertices: seams, sharp edges, borders of materials."""
+    """The edges of each kind in `MARKS` as pairs of vertices: the artist's seams, sharp edges, borders of materials."""
     edges = read_array(mesh.edges, "vertices", np.int32, 2)
     marks = {
-        "seams": edges[read_array(mesh.edges, "use_seam", bool)],
+        "seams": edges[seams.wished_seams(mesh)],
         "sharp": edges[read_array(mesh.edges, "use_edge_sharp", bool)],
         "materials": edges[:0],
     }
@@ -234,11 +205,6 @@ def read_marks(mesh, face_sizes):
         border[corner_edges[material != any_of[corner_edges]]] = True
         marks["materials"] = edges[border]
     return marks
-
-
-def renumber(indices, chosen):
-    """Indices into the elements that remain when only the chosen ones are kept."""
-    return (np.cumsum(chosen, dtype=np.int32) - 1)[indices].reshape(indices.shape)
 
 
 def scale_as_in_scene(positions, matrix_world):
@@ -287,42 +253,11 @@ def find_mesh(part):
     return mesh
 
 
-@contextmanager
-def object_mode(meshes):
-    """Leaves edit mode for a while if any of the meshes is in it: UV maps are empty arrays there."""
-    if not any(mesh.is_editmode for mesh in meshes):
-        yield
-        return
-    view_layer = bpy.context.view_layer
-    editing = [obj for obj in view_layer.objects if obj.type == "MESH" and obj.mode == "EDIT"]
-    selected = {obj: obj.select_get() for obj in editing}
-    active = view_layer.objects.active
-    if not editing:
-        raise MeshError("The mesh is in edit mode in another scene or view layer; leave it there first")
-    if active not in editing:
-        view_layer.objects.active = editing[0]
-    bpy.ops.object.mode_set(mode="OBJECT")
-    try:
-        yield
-    finally:
-        for obj in editing:
-            obj.select_set(True)  # edit mode takes every selected object of the active one's type
-        others = [obj for obj in view_layer.objects if obj.type == "MESH" and obj.select_get() and obj not in editing]
-        for obj in others:
-            obj.select_set(False)
-        bpy.ops.object.mode_set(mode="EDIT")
-        for obj in others:
-            obj.select_set(True)
-        for obj, state in selected.items():
-            obj.select_set(state)
-        view_layer.objects.active = active
-
-
-def check_parts(selection, make_new_map=False):
+def check_parts(selection, target=ACTIVE_MAP):
     """The meshes of all parts, or `MeshError` where one is gone, edited or full."""
     meshes = [find_mesh(part) for part in selection.parts]
-    if make_new_map and any(len(mesh.uv_layers) >= MAX_UV_MAPS for mesh in meshes):
-        raise MeshError(f"A mesh has {MAX_UV_MAPS} UV maps already; nothing was changed")
+    for part, mesh in zip(selection.parts, meshes, strict=True):
+        uv_maps.map_to_write(mesh, target, part.group_names)
     return meshes
 
 
@@ -331,17 +266,18 @@ def active_maps(selection):
     return [find_mesh(part).uv_layers.active.name for part in selection.parts]
 
 
-def write_uvs(selection, uv, *, make_new_map=False, map_name="UVMap", mark_seams=False):
-    """Writes one UV per corner to all parts, and returns what the meshes hold afterwards, (c, 2) float32.
+def write_uvs(selection, uv, *, target=ACTIVE_MAP, mark_seams=False):
+    """Writes one UV per corner to all parts, and returns what each mesh holds afterwards, a list of (c, 2) float32.
 
-    Nothing is changed when any mesh is gone, edited or full. Only the corners of the selection are written.
+    Nothing is changed when any mesh is gone, edited or full. Only the corners of the selection are written; what is
+    returned are those of the whole mesh.
     """
     uv = np.ascontiguousarray(uv, np.float32)
-    meshes = check_parts(selection, make_new_map)
-    held = np.empty_like(uv)
+    meshes = check_parts(selection, target)
+    held = []
     with object_mode(meshes):
         for part, mesh in zip(selection.parts, meshes, strict=True):
-            layer = writable_layer(mesh, make_new_map, map_name)
+            layer = uv_maps.writable_layer(mesh, target, part.group_names)
             layer_name = layer.name
             if part.source_corners is None:
                 values = uv[part.corners]
@@ -350,11 +286,51 @@ def write_uvs(selection, uv, *, make_new_map=False, map_name="UVMap", mark_seams
                 values[part.source_corners] = uv[part.corners]
             write_layer(mesh, layer_name, values)
             if mark_seams:
-                mark_chart_borders(mesh, values, part.source_faces)
+                seams.mark_chart_borders(mesh, values, part.source_faces)
             mesh.update()
-            after = read_array(mesh.uv_layers[layer_name].uv, "vector", np.float32, 2)
-            held[part.corners] = after if part.source_corners is None else after[part.source_corners]
+            held.append(read_array(mesh.uv_layers[layer_name].uv, "vector", np.float32, 2))
     return held
+
+
+def of_selection(selection, held):
+    """From the UVs of whole meshes those of the selection's corners, (c, 2) float32."""
+    result = np.empty((selection.face_offsets[-1], 2), np.float32)
+    for part, values in zip(selection.parts, held, strict=True):
+        result[part.corners] = values if part.source_corners is None else values[part.source_corners]
+    return result
+
+
+def kept_faces(selection, held):
+    """The faces of the selection's meshes that are not in it and have finite UVs, given the UVs of whole meshes.
+
+    (positions, corner_vertices, face_offsets, corner_triangles, uv), all meshes together; None where there is no face.
+    """
+    columns = []
+    vertex_base = corner_base = 0
+    for part, uv in zip(selection.parts, held, strict=True):
+        if part.source_faces is None:
+            continue
+        mesh = find_mesh(part)
+        kept = np.logical_and.reduceat(np.isfinite(uv).all(axis=1), read_face_offsets(mesh)[:-1])
+        kept[part.source_faces] = False
+        if not kept.any():
+            continue
+        block = read_mesh(mesh, kept)
+        columns.append(
+            (
+                block["positions"],
+                block["corner_vertices"] + vertex_base,
+                block["face_sizes"],
+                block["triangles"] + corner_base,
+                uv[block["source_corners"]],
+            )
+        )
+        vertex_base += len(block["positions"])
+        corner_base += len(block["corner_vertices"])
+    if not columns:
+        return None
+    positions, corner_vertices, sizes, triangles, uv = map(np.concatenate, zip(*columns, strict=True))
+    return positions, corner_vertices, np.append(0, np.cumsum(sizes)), triangles, uv
 
 
 def write_layer(mesh, name, values):
@@ -366,52 +342,17 @@ def write_layer(mesh, name, values):
     mesh.attributes[name].data.foreach_set("vector", np.ascontiguousarray(values, np.float32).reshape(-1))
 
 
-def writable_layer(mesh, make_new_map, map_name):
-    """The UV map to write: the active one, or a new one that becomes active."""
-    layer = mesh.uv_layers.active
-    if layer is None or make_new_map:
-        layer = mesh.uv_layers.new(name=map_name or "UVMap")
-        if layer is None:
-            raise MeshError(f"{mesh.name}: Blender could not add a UV map")
-        mesh.uv_layers.active = layer
-    return layer
-
-
-def read_uvs(selection):
-    """UVs of the active maps for the corners of the selection, (c, 2) float32; None where a mesh has no map."""
+def read_uvs(selection, target=ACTIVE_MAP):
+    """UVs that the maps to write hold for the corners of the selection, (c, 2) float32; None where a map is missing."""
     meshes = [find_mesh(part) for part in selection.parts]
-    if any(mesh.uv_layers.active is None for mesh in meshes):
+    maps = [
+        uv_maps.map_to_write(mesh, target, part.group_names) for part, mesh in zip(selection.parts, meshes, strict=True)
+    ]
+    if not all(there for _, there in maps):
         return None
-    held = np.empty((selection.face_offsets[-1], 2), np.float32)
     with object_mode(meshes):
-        for part, mesh in zip(selection.parts, meshes, strict=True):
-            values = read_array(mesh.uv_layers.active.uv, "vector", np.float32, 2)
-            held[part.corners] = values if part.source_corners is None else values[part.source_corners]
-    return held
-
-
-def mark_chart_borders(mesh, uv, source_faces):
-    """Adds a seam on every edge where the UVs of two neighbouring faces differ, at least one of them unwrapped."""
-    corner_vertices = read_corner_vertices(mesh)
-    offsets = read_face_offsets(mesh)
-    sizes = np.diff(offsets)
-    corner_edges = read_array(mesh.loops, "edge_index", np.int32)
-    following = np.arange(1, len(corner_vertices) + 1, dtype=np.int32)
-    following[offsets[1:] - 1] = offsets[:-1]
-    # UVs at both ends of a corner's edge, the lower vertex first, so that neighbours compare whatever their winding.
-    ends = np.concatenate([uv, uv[following]], axis=1)
-    turned = corner_vertices > corner_vertices[following]
-    ends[turned] = ends[turned][:, [2, 3, 0, 1]]
-    first = np.full(len(mesh.edges), -1, np.int32)
-    first[corner_edges[::-1]] = np.arange(len(corner_edges) - 1, -1, -1, dtype=np.int32)
-    differs = (ends != ends[first[corner_edges]]).any(axis=1)
-    border = np.zeros(len(mesh.edges), bool)
-    border[corner_edges[differs]] = True
-    if source_faces is not None:
-        chosen = np.zeros(len(mesh.polygons), bool)
-        chosen[source_faces] = True
-        touched = np.zeros(len(mesh.edges), bool)
-        touched[corner_edges[np.repeat(chosen, sizes)]] = True
-        border &= touched
-    seams = read_array(mesh.edges, "use_seam", bool)
-    mesh.edges.foreach_set("use_seam", seams | border)
+        held = [
+            read_array(mesh.uv_layers[name].uv, "vector", np.float32, 2)
+            for mesh, (name, _) in zip(meshes, maps, strict=True)
+        ]
+    return of_selection(selection, held)

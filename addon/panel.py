@@ -4,11 +4,11 @@ import json
 
 import bpy
 
-from . import properties, targets
+from . import last_result, properties, targets
 
 CATEGORY = "BLE Unwrap"
 STATUS_ICONS = {"HEAD": "DOT", "OK": "CHECKMARK", "BAD": "ERROR", "WARN": "INFO", "INFO": "BLANK1"}
-WARNING_CHARACTERS = 34  # of a line of the panel at its usual width
+LINE_CHARACTERS = 36  # of a line of the panel at its usual width
 
 
 def draw_settings(layout, context, names):
@@ -58,7 +58,7 @@ class _Certificate:
 
     @classmethod
     def poll(cls, context):
-        return bool(context.window_manager.ble_unwrap_certificate.lines)
+        return last_result.is_true(context)
 
     def draw(self, context):
         certificate = context.window_manager.ble_unwrap_certificate
@@ -66,9 +66,14 @@ class _Certificate:
         column.label(text=certificate.title, icon="UV")
         for status, text in json.loads(certificate.lines):
             icon = STATUS_ICONS.get(status, "BLANK1")
-            for line in wrapped(text) if status == "WARN" else [text]:
+            for line in wrapped(text):
                 column.label(text=line, icon=icon)
                 icon = "BLANK1"
+        if certificate.crowded:
+            number = f"{certificate.crowded:,} Edge{'' if certificate.crowded == 1 else 's'}"
+            self.layout.operator(
+                "mesh.ble_unwrap_select_edges", text=f"Select {number} of More than Two Faces", icon="EDGESEL"
+            )
 
 
 class _Advanced:
@@ -91,7 +96,7 @@ def wrapped(text):
     """A text in lines that fit the panel."""
     lines, line = [], ""
     for word in text.split():
-        if line and len(line) + 1 + len(word) > WARNING_CHARACTERS:
+        if line and len(line) + 1 + len(word) > LINE_CHARACTERS:
             lines.append(line)
             line = word
         else:

@@ -24,18 +24,19 @@ PAPER_VALUES = {
     "least_sewn": 1000.0,
     "stretch_solver": "LINE_SEARCH",
     "stretch_iterations": 60,
-    "margin": 2.0,
-    "texture_size": (1024, 1024),
     "rotation": "QUARTER",
 }
 # Preset -> what it differs in from the defaults.
 PRESET_VALUES = {"PAPER": PAPER_VALUES, "ISO_CHARTS": PAPER_VALUES | {"model": "ISOMAP"}}
+# What an artist wants of the result whatever the method: presets leave these alone, and the native module, whose
+# presets have values of their own for them, always gets them.
+KEPT_BY_PRESETS = ("stretch_limit", "texture_size", "margin")
 
 
 def _apply_preset(settings, _context):
     """Shows the preset's own values: what the panel displays is what will run."""
     for name in annotations():
-        if name not in BRIDGE_SETTINGS and name != "preset":
+        if name not in (*BRIDGE_SETTINGS, *KEPT_BY_PRESETS, "preset"):
             settings.property_unset(name)
     for name, value in PRESET_VALUES.get(settings.preset, {}).items():
         setattr(settings, name, value)
@@ -46,7 +47,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
 
     preset: EnumProperty(
         name="Preset",
-        description="Starting values of all settings below",
+        description="How it is done: values of all settings but stretch limit, texture size, margin and the result's",
         items=(
             ("DEFAULT", "Default", "Extended model, fast solvers: least stretch and fewest charts"),
             ("PAPER", "Paper", "The published method as printed: slower, more charts"),
@@ -85,7 +86,10 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     )
     texture_size: IntVectorProperty(
         name="Texture Size",
-        description="Width and height in pixels of the texture that the margin is meant for; need not be square",
+        description=(
+            "Width and height in pixels of the texture that the UVs are meant for: its proportions and, for the "
+            "margin, its resolution"
+        ),
         default=(2048, 2048),
         size=2,
         min=16,
@@ -109,19 +113,26 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         description="How charts may be turned to pack them tighter",
         items=(
             ("ANY", "Any", "Any angle: tightest"),
-            ("QUARTER", "Quarter Turns", "Upright, then by multiples of 90°"),
-            ("NONE", "None", "As they were flattened"),
+            (
+                "QUARTER",
+                "Quarter Turns",
+                "By multiples of 90° from how they were flattened; not set upright",
+            ),
+            ("NONE", "None", "As they were flattened, at whatever angle that is"),
         ),
         default="ANY",
     )
     use_seams: BoolProperty(
-        name="Keep Seams",
-        description="Cut along the seams that the mesh already has, and add only those that the stretch limit needs",
-        default=False,
+        name="Cut at Seams",
+        description=(
+            "Cut along the seams that the mesh has, but for those of an earlier Mark Seams, and wherever the stretch "
+            "limit needs more"
+        ),
+        default=True,
     )
     follow_seams: BoolProperty(
         name="Follow Seams",
-        description="Where a chart needs a border, draw it to seams that the mesh has, without cutting all of them",
+        description="Where a chart needs a border, draw it to seams of the mesh, without cutting all of them",
         default=True,
     )
     follow_sharp: BoolProperty(
@@ -136,8 +147,16 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     )
     use_selection: BoolProperty(
         name="Only Selected",
-        description="In Edit Mode, unwrap the selected faces, or points of a cloud, and leave the others as they are",
+        description=(
+            "In Edit Mode, unwrap the selected faces, or points of a cloud, and leave the others as they are; in the "
+            "UV Editor without Sync Selection, the faces selected there. Hidden ones are always left"
+        ),
         default=True,
+    )
+    move_pinned: BoolProperty(
+        name="Move Pinned",
+        description="Unwrap faces with pinned UVs like any others; else they are refused, since pins are to hold",
+        default=False,
     )
 
     # ---- where the result goes
@@ -146,15 +165,23 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         description="Which UV map is written; of a point cloud, which attribute of two numbers a point",
         items=(
             ("ACTIVE", "Active", "Replace the active UV map, of points the one of this name; made where there is none"),
-            ("NEW", "New", "Add a UV map and make it the active one"),
+            ("NEW", "By Name", "Replace the UV map of this name, made where there is none, and make it the active one"),
         ),
         default="ACTIVE",
     )
     uv_map_name: StringProperty(
         name="Name",
-        description="Name of UV maps that are made and of a cloud's attribute; if other data has it, the next free one",
+        description="Name of the UV map and of a cloud's attribute; if other data has it, a number is added",
         default="UVMap",
         maxlen=60,
+    )
+    correct_aspect: BoolProperty(
+        name="Image Proportions",
+        description=(
+            "Where Texture Size is square, take the proportions of the image that the materials show with the UV map; "
+            "Texture Size is its longer side then. A Texture Size that is not square always holds"
+        ),
+        default=True,
     )
     use_original_bounds: BoolProperty(
         name="Keep Place",
@@ -163,7 +190,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     )
     mark_seams: BoolProperty(
         name="Mark Seams",
-        description="Mark the borders of the charts as seams of the mesh, beside those it has",
+        description="Mark the borders of the charts as seams of the mesh, in the place of those marked so before",
         default=False,
     )
 
@@ -392,12 +419,13 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
 
 # Settings that the native module never sees.
 BRIDGE_SETTINGS = (
-    *("use_seams", "follow_seams", "follow_sharp", "follow_materials", "use_selection"),
-    *("uv_map", "uv_map_name", "use_original_bounds", "mark_seams"),
+    *("use_seams", "follow_seams", "follow_sharp", "follow_materials", "use_selection", "move_pinned"),
+    *("uv_map", "uv_map_name", "correct_aspect", "use_original_bounds", "mark_seams"),
 )
 # What means something for surfaces only, or for clouds only; the other one's functions do not take it.
 SURFACE_SETTINGS = (
     *("use_seams", "follow_seams", "follow_sharp", "follow_materials", "mark_seams"),
+    *("move_pinned", "correct_aspect"),
     *("limit_over", "weld", "weld_distance", "merge", "least_sewn", "holes", "chart_scale"),
     *("crease_weight", "geodesics"),
     *("together_max", "stretch_solver", "stretch_iterations"),
@@ -407,7 +435,7 @@ CLOUD_SETTINGS = ("neighbours",)
 # What the panel shows at once, and what it folds away, by title.
 MAIN_SETTINGS = ("stretch_limit", "texture_size", "margin", "rotation", "use_seams", "use_selection")
 ADVANCED_SETTINGS = (
-    ("Result", ("uv_map", "uv_map_name", "use_original_bounds", "mark_seams")),
+    ("Result", ("uv_map", "uv_map_name", "correct_aspect", "use_original_bounds", "move_pinned", "mark_seams")),
     ("Borders", ("follow_seams", "follow_sharp", "follow_materials", "crease_weight")),
     (
         "Charts",
@@ -438,34 +466,45 @@ def operator_annotations():
     They are not remembered from its last run, since the scene keeps them: what a call leaves out comes from the scene
     (interactively) or from the defaults (in a script).
     """
-    result = {}
-    for name, deferred in annotations().items():
-        keywords = {key: value for key, value in deferred.keywords.items() if key != "update"}
-        keywords["options"] = {"SKIP_SAVE"}
-        result[name] = deferred.function(**keywords)
-    return result
+    return {
+        name: deferred.function(**{**deferred.keywords, "options": {"SKIP_SAVE"}})
+        for name, deferred in annotations().items()
+    }
 
 
 def copy_unset(target, source):
     """Gives `target` the values of `source` for every setting that `target` does not have set itself."""
     explicit = {name for name in annotations() if target.is_property_set(name)}
     # A preset named in the call brings its own values: the scene's must not override them.
-    names = [name for name in annotations() if "preset" not in explicit or name in BRIDGE_SETTINGS]
+    kept = (*BRIDGE_SETTINGS, *KEPT_BY_PRESETS)
+    names = [name for name in annotations() if "preset" not in explicit or name in kept]
     for name in names:
         if name not in explicit and source.is_property_set(name):
             setattr(target, name, getattr(source, name))
 
 
+def copy_changed(source, target):
+    """Gives `target` the values of `source` wherever they differ; the preset first, which brings others."""
+    for name in annotations():
+        value = getattr(source, name)
+        if _plain(name, getattr(target, name)) != _plain(name, value):
+            setattr(target, name, value)
+
+
 def values(settings):
     """Settings as plain values; those of the native module only where they were set, so that its presets hold."""
-    result = {}
-    for name in annotations():
-        if name in BRIDGE_SETTINGS or name == "preset" or settings.is_property_set(name):
-            value = getattr(settings, name)
-            if isinstance(value, float):
-                value = float(f"{value:.7g}")  # Blender keeps 32 bits: 1.1 is meant, not 1.10000002384
-            result[name] = tuple(value) if name == "texture_size" else value
-    return result
+    always = (*BRIDGE_SETTINGS, *KEPT_BY_PRESETS, "preset")
+    return {
+        name: _plain(name, getattr(settings, name))
+        for name in annotations()
+        if name in always or settings.is_property_set(name)
+    }
+
+
+def _plain(name, value):
+    if isinstance(value, float):
+        return float(f"{value:.7g}")  # Blender keeps 32 bits: 1.1 is meant, not 1.10000002384
+    return tuple(value) if name == "texture_size" else value
 
 
 def default_values(preset="DEFAULT"):
@@ -476,25 +515,11 @@ def default_values(preset="DEFAULT"):
     return result
 
 
-class BLEUnwrapCertificate(bpy.types.PropertyGroup):
-    """What the last run measured from the UVs that Blender holds; of this session only."""
-
-    title: StringProperty(name="Objects", options={"SKIP_SAVE"})
-    lines: StringProperty(name="Lines", description="JSON list of [status, text]", options={"SKIP_SAVE"})
-
-
-CLASSES = (BLEUnwrapSettings, BLEUnwrapCertificate)
-
-
 def register():
-    for cls in CLASSES:
-        bpy.utils.register_class(cls)
+    bpy.utils.register_class(BLEUnwrapSettings)
     bpy.types.Scene.ble_unwrap = bpy.props.PointerProperty(type=BLEUnwrapSettings)
-    bpy.types.WindowManager.ble_unwrap_certificate = bpy.props.PointerProperty(type=BLEUnwrapCertificate)
 
 
 def unregister():
-    del bpy.types.WindowManager.ble_unwrap_certificate
     del bpy.types.Scene.ble_unwrap
-    for cls in reversed(CLASSES):
-        bpy.utils.unregister_class(cls)
+    bpy.utils.unregister_class(BLEUnwrapSettings)

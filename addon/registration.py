@@ -1,9 +1,9 @@
 """Registers the add-on's modules in order, and takes them back in reverse."""
 
-from . import command, menu, panel, preferences, properties
-from .operators import unwrap
+from . import command, last_result, menu, panel, preferences, properties
+from .operators import select_edges, unwrap
 
-MODULES = (preferences, properties, unwrap, panel, menu, command)
+MODULES = (preferences, properties, last_result, unwrap, select_edges, panel, menu, command)
 
 
 def register():

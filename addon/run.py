@@ -15,12 +15,12 @@ class Run:
     """Reads all objects when made, then computes (`run` or `start`), then writes (`write`).
 
     Surfaces share one atlas (`one_atlas=False`: have one each); a cloud has a texture to itself. With `keep`, the
-    analysis of the one atlas is kept for the next run. What has neither faces nor enough points is left out as long as
-    anything else is there, with a note where there are some points. Raises what the tasks raise; whenever it does,
-    nothing was changed.
+    analysis of the one atlas is kept for the next run. `by_uv` as in `faces.chosen_faces`. What has neither faces nor
+    enough points is left out as long as anything else is there, with a note where there are some points. Raises what
+    the tasks raise; whenever it does, nothing was changed.
     """
 
-    def __init__(self, objects, settings, *, threads=0, one_atlas=True, keep=False):
+    def __init__(self, objects, settings, *, threads=0, one_atlas=True, keep=False, by_uv=False):
         settings = {"preset": "DEFAULT", "use_selection": False, **settings}
         for obj in objects:
             if obj.type == "MESH" and obj.mode == "EDIT":
@@ -30,7 +30,7 @@ class Run:
         surfaces = [obj for obj in objects if targets.is_surface(obj)]
         for group in [surfaces] if one_atlas and surfaces else [[obj] for obj in surfaces]:
             try:
-                self.tasks.append(UnwrapTask(group, settings, threads=threads, keep=keep and one_atlas))
+                self.tasks.append(UnwrapTask(group, settings, threads=threads, keep=keep and one_atlas, by_uv=by_uv))
             except NothingToUnwrap as error:
                 reasons.append(str(error))
         for obj in filter(targets.is_cloud, objects):
@@ -76,6 +76,11 @@ class Run:
         outcomes[-1].certificate.warnings.extend(self.notes)
         outcomes[-1].lines.extend(["WARN", text] for text in self.notes)
         return outcomes
+
+    def maps(self, outcomes):
+        """Every object that was written with the name of its map, after `write`."""
+        pairs = zip(self.tasks, outcomes, strict=True)
+        return [pair for task, outcome in pairs for pair in zip(task.written, outcome.maps, strict=True)]
 
 
 class RunJob:

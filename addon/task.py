@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import engine, mesh_bridge, properties
+from . import engine, mesh_bridge, properties, textures, units, uv_maps
 
 POLL_SECONDS = 0.02
 SMALLEST_BOUNDS = 1e-4  # of the unit square: a smaller rectangle is no place to pack into
@@ -46,24 +46,46 @@ class UnwrapTask:
     Raises `mesh_bridge.MeshError`, `engine.EngineMissing`, `engine.EngineError`; whenever it does, no mesh was changed.
     """
 
-    def __init__(self, objects, settings, *, threads=0, keep=False):
+    def __init__(self, objects, settings, *, threads=0, keep=False, by_uv=False):
         self.objects = list(objects)
         self.settings = {**properties.default_values(settings.get("preset", "DEFAULT")), **settings}
-        self.make_new_map = self.settings["uv_map"] == "NEW"
+        self.target = uv_maps.MapChoice(self.settings["uv_map"] == "NEW", self.settings["uv_map_name"])
         self.selection = mesh_bridge.gather(
-            objects, only_selected=self.settings["use_selection"], make_new_map=self.make_new_map
+            objects,
+            only_selected=self.settings["use_selection"],
+            by_uv=by_uv,
+            target=self.target,
+            move_pinned=self.settings["move_pinned"],
         )
         self.native = properties.native_values(settings, properties.CLOUD_SETTINGS)
+        self.native |= {name: self.settings[name] for name in properties.KEPT_BY_PRESETS}
         self.native["threads"] = threads
+        self.notes = []  # what was done, for the panel; no reason to worry
+        self._look_at_textures()
         self.keep = keep  # the analysis, for the next unwrap of the same meshes
         self.bounds = None
         if self.settings["use_original_bounds"]:
             self._keep_place()
         self.timer = Timer()
 
+    def _look_at_textures(self):
+        """Takes the proportions of the materials' images, and warns where a UV map that they use is replaced."""
+        objects = self.written
+        maps = [uv_maps.map_to_write(obj.data, self.target, uv_maps.group_names(obj)) for obj in objects]
+        for obj, (name, there) in zip(objects, maps, strict=True):
+            if there and (note := textures.replaced_note(obj, name)):
+                self.selection.warnings.append(note)
+        if self.settings["correct_aspect"]:
+            # The first map of a mesh becomes the one that textures use.
+            names = [name if obj.data.uv_layers else None for obj, (name, _) in zip(objects, maps, strict=True)]
+            size, note = textures.proportioned_size(objects, names, self.settings["texture_size"])
+            self.settings["texture_size"] = self.native["texture_size"] = size
+            self.notes += [note] if note else []
+
     def _keep_place(self):
         """Packs for the part of the texture that the old UVs fill, so that margin and density come out right."""
-        self.bounds, why_not = bounds_to_keep(mesh_bridge.read_uvs(self.selection), self.settings["texture_size"])
+        held = mesh_bridge.read_uvs(self.selection, self.target)
+        self.bounds, why_not = bounds_to_keep(held, self.settings["texture_size"])
         if self.bounds is None:
             self.selection.warnings.append(why_not)
         else:
@@ -72,6 +94,12 @@ class UnwrapTask:
     @property
     def title(self):
         return self.selection.title
+
+    @property
+    def written(self):
+        """The objects whose meshes are written: those with faces that are to be unwrapped."""
+        parts = {part.mesh_uid for part in self.selection.parts}
+        return [obj for obj in self.objects if obj.data.session_uid in parts]
 
     @property
     def element_count(self):
@@ -93,19 +121,14 @@ class UnwrapTask:
 
     def check(self):
         """Raises `mesh_bridge.MeshError` where `write` would: several tasks are written together or not at all."""
-        mesh_bridge.check_parts(self.selection, self.make_new_map)
+        mesh_bridge.check_parts(self.selection, self.target)
 
     def write(self, result, *, measure_again=True):
         """Writes a result to the meshes and judges what they hold afterwards."""
         self.timer.start()
         uv = placed(result.uv, self.bounds)
-        held = mesh_bridge.write_uvs(
-            self.selection,
-            uv,
-            make_new_map=self.make_new_map,
-            map_name=self.settings["uv_map_name"],
-            mark_seams=self.settings["mark_seams"],
-        )
+        whole = mesh_bridge.write_uvs(self.selection, uv, target=self.target, mark_seams=self.settings["mark_seams"])
+        held = mesh_bridge.of_selection(self.selection, whole)
         margin = self.settings["margin"]
         limit = {name: self.settings[name] for name in ("stretch_limit", "limit_over")}
         measured = result.report
@@ -116,6 +139,14 @@ class UnwrapTask:
                 measured = engine.measure(self.selection, held, **given)
             except engine.EngineError as error:  # the UVs are written: say what is known
                 warnings.append(f"The written UVs could not be measured: {error}")
+        if kept := mesh_bridge.kept_faces(self.selection, whole):
+            overlaps = self._overlaps(held, kept)
+            measured = {**measured, "overlaps_with_kept": overlaps}
+            if overlaps:
+                warnings.append(
+                    f"New charts lie on faces that were kept, {engine.counted(overlaps, 'pair')} of triangles: select "
+                    "those faces, too, turn on Keep Place, or pack all charts afterwards (UV > Pack Islands)"
+                )
         certificate = engine.certify(measured, margin=margin, warnings=warnings, **limit)
         seconds = self.timer.seconds()
         return Outcome(
@@ -124,9 +155,18 @@ class UnwrapTask:
             report=result.report,
             seconds=seconds,
             summary=engine.summary(measured, seconds),
-            lines=engine.lines(certificate, margin=margin, **limit),
+            lines=engine.lines(certificate, margin=margin, **limit, notes=self.notes, length_text=units.length_text),
             maps=mesh_bridge.active_maps(self.selection),
         )
+
+    def _overlaps(self, held, kept):
+        """Pairs of triangles, one unwrapped and one kept, that share area in the UV map."""
+        chosen = self.selection
+        triangles = chosen.corner_triangles
+        if triangles is None:
+            triangles = np.arange(len(chosen.corner_vertices), dtype=np.int32).reshape(-1, 3)
+        unwrapped = (chosen.positions, chosen.corner_vertices, chosen.face_offsets, triangles, held)
+        return engine.overlaps_between(unwrapped, kept)
 
 
 @dataclass

@@ -290,6 +290,11 @@ def tops(names: set[str]) -> set[str]:
 
 # File of the add-on -> what it never imports.
 NEVER = {
+    **{
+        name: {".engine", ".mesh_bridge", ".cloud_bridge", ".properties", "ble_unwrap_native"}
+        for name in ("mesh_arrays.py", "faces.py", "seams.py", "uv_maps.py", "textures.py", "units.py")
+    },
+    "last_result.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
     "mesh_bridge.py": {".engine", ".cloud_bridge", "ble_unwrap_native"},
     "cloud_bridge.py": {".engine", "ble_unwrap_native"},
     "point_file.py": {"bpy", "bmesh", ".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},

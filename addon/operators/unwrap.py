@@ -1,10 +1,9 @@
 """The operator `uv.ble_unwrap`: gather, compute with progress and Esc, write back, report."""
 
-import json
-
 import bpy
+from bpy.props import BoolProperty
 
-from .. import engine, mesh_bridge, preferences, properties, targets
+from .. import engine, faces, last_result, mesh_bridge, preferences, properties, targets
 from ..panel import panel_settings
 from ..run import Run
 
@@ -37,7 +36,12 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
     )
     bl_options = {"REGISTER", "UNDO"}
 
-    __annotations__ = properties.operator_annotations()
+    __annotations__ = properties.operator_annotations() | {
+        # Kept with a run, so that the redo panel repeats it: whether the UV Editor's selection counts, and whether
+        # the sidebar takes over what is set in the redo panel.
+        "by_uv": BoolProperty(options={"HIDDEN", "SKIP_SAVE"}),
+        "from_sidebar": BoolProperty(options={"HIDDEN", "SKIP_SAVE"}),
+    }
 
     @classmethod
     def poll(cls, context):
@@ -51,6 +55,7 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
 
     def invoke(self, context, _event):
         properties.copy_unset(self.properties, context.scene.ble_unwrap)
+        self.from_sidebar = True
         if bpy.app.background:
             return self.execute(context)
         try:
@@ -118,11 +123,14 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
                     body.prop(self, name)
 
     def _run(self, context):
+        if not self.properties.is_property_set("by_uv"):
+            self.by_uv = faces.by_uv_selection(context)
         return Run(
             targets.target_objects(context),
             properties.values(self.properties),
             threads=preferences.preference(context, "threads"),
             keep=True,  # the redo panel unwraps the same meshes again
+            by_uv=self.by_uv,
         )
 
     def _start(self, context, run):
@@ -148,9 +156,9 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
 
     def _finish(self, context, run, results):
         outcomes = run.write(results, measure_again=preferences.preference(context, "measure_again"))
-        shown = context.window_manager.ble_unwrap_certificate
-        shown.title = titles(outcomes)
-        shown.lines = json.dumps(certificate_lines(outcomes))
+        if self.from_sidebar:
+            properties.copy_changed(self.properties, context.scene.ble_unwrap)
+        last_result.show(context, titles(outcomes), certificate_lines(outcomes), run.maps(outcomes))
         for outcome in outcomes:
             for text in outcome.certificate.warnings:
                 self.report({"WARNING"}, text)

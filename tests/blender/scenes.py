@@ -73,6 +73,22 @@ def set_uvs(obj, values):
     obj.data.attributes[name].data.foreach_set("vector", np.asarray(values, np.float32).reshape(-1))
 
 
+def is_cut(obj, edge_index):
+    """Whether the two faces at an edge have different UVs along it."""
+    corners = {}
+    uv = uvs(obj)
+    edge = obj.data.edges[edge_index]
+    for loop in obj.data.loops:
+        if loop.vertex_index in edge.vertices:
+            corners.setdefault(loop.vertex_index, {})[loop.index] = tuple(uv[loop.index])
+    faces = [face for face in obj.data.polygons if set(edge.vertices) <= set(face.vertices)]
+    for vertex in edge.vertices:
+        found = {corners[vertex][loop] for face in faces for loop in face.loop_indices if loop in corners[vertex]}
+        if len(found) > 1:
+            return True
+    return False
+
+
 def triangle_areas(obj, uv):
     """Signed UV areas of Blender's own triangulation: positive is not flipped."""
     mesh = obj.data

@@ -204,12 +204,13 @@ def test_own_map_is_written_again(make):
 def test_new_map_and_its_name(make):
     obj = make()
     set_point_map(obj, np.full((400, 2), 0.5), "scan")
-    unwrap(uv_map="NEW", uv_map_name="scan")
-    assert attribute_names(obj) == ["scan", "scan.001"]
+    for _ in range(2):
+        unwrap(uv_map="NEW", uv_map_name="second")
+    assert attribute_names(obj) == ["scan", "second"]
     assert (point_map(obj, "scan") == 0.5).all()
-    assert_points_mapped(obj, "scan.001")
-    unwrap(uv_map_name="second")
     assert_points_mapped(obj, "second")
+    unwrap(uv_map_name="third")
+    assert_points_mapped(obj, "third")
 
 
 @BOTH

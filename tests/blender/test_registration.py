@@ -49,14 +49,12 @@ def test_presets_are_those_of_the_native_module(addon, preset):
     shown = {
         name: getattr(settings, name)
         for name in properties.annotations()
-        if name not in (*properties.BRIDGE_SETTINGS, *properties.CLOUD_SETTINGS)
+        if name not in (*properties.BRIDGE_SETTINGS, *properties.CLOUD_SETTINGS, *properties.KEPT_BY_PRESETS)
     }
-    shown["texture_size"] = tuple(shown["texture_size"])
     ours = engine.native_settings(shown)
     theirs = engine.default_settings(preset)
-    theirs.pop("threads")
-    size = theirs["texture_size"]
-    theirs["texture_size"] = (size, size) if isinstance(size, int) else tuple(size)
+    for name in ("threads", *properties.KEPT_BY_PRESETS):
+        theirs.pop(name)
     assert set(ours) == set(theirs)
     for name, value in theirs.items():
         expected = pytest.approx(value, rel=1e-6) if isinstance(value, float) else value
@@ -94,11 +92,10 @@ def test_neighbours_default_and_range_are_the_native_modules(addon):
 def test_choosing_a_preset_keeps_where_the_result_goes():
     settings = bpy.context.scene.ble_unwrap
     settings.uv_map = "NEW"
-    settings.margin = 9
     settings.preset = "PAPER"
-    assert (settings.uv_map, settings.margin, settings.stretch_solver) == ("NEW", 2, "LINE_SEARCH")
+    assert (settings.uv_map, settings.stretch_solver) == ("NEW", "LINE_SEARCH")
     settings.preset = "DEFAULT"
-    assert (settings.uv_map, settings.margin, settings.stretch_solver) == ("NEW", 4, "NEWTON")
+    assert (settings.uv_map, settings.stretch_solver) == ("NEW", "NEWTON")
 
 
 def test_scene_settings_fill_what_a_call_leaves_out(addon):
@@ -116,12 +113,13 @@ def test_scene_settings_fill_what_a_call_leaves_out(addon):
     scene = bpy.context.scene.ble_unwrap
     scene.margin = 7
     scene.seed = 3
+    scene.crease_weight = 0.5
     target = Target(seed=5)
     properties.copy_unset(target, scene)
-    assert (target.margin, target.seed) == (7, 5)
+    assert (target.margin, target.seed, target.crease_weight) == (7, 5, 0.5)
     target = Target(preset="PAPER")
     properties.copy_unset(target, scene)
-    assert not target.is_property_set("margin")
+    assert target.margin == 7 and not target.is_property_set("crease_weight")
 
 
 def test_unregister_leaves_nothing_and_register_works_again(addon):

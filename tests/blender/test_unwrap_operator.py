@@ -12,6 +12,7 @@ from scenes import (
     edit,
     fingerprint,
     grid,
+    is_cut,
     n_gons,
     select,
     set_uvs,
@@ -270,28 +271,12 @@ def cut_columns(obj, cells):
         edge.use_seam = all(vertex // (cells + 1) == middle for vertex in edge.vertices)
 
 
-def is_cut(obj, edge_index):
-    """Whether the two faces at an edge have different UVs along it."""
-    corners = {}
-    uv = uvs(obj)
-    edge = obj.data.edges[edge_index]
-    for loop in obj.data.loops:
-        if loop.vertex_index in edge.vertices:
-            corners.setdefault(loop.vertex_index, {})[loop.index] = tuple(uv[loop.index])
-    faces = [face for face in obj.data.polygons if set(edge.vertices) <= set(face.vertices)]
-    for vertex in edge.vertices:
-        found = {corners[vertex][loop] for face in faces for loop in face.loop_indices if loop in corners[vertex]}
-        if len(found) > 1:
-            return True
-    return False
-
-
-def test_existing_seams_are_cut_on_request_only():
+def test_existing_seams_are_cut_unless_told_not_to():
     obj = grid(6)
     cut_columns(obj, 6)
     seams = [edge.index for edge in obj.data.edges if edge.use_seam]
     assert len(seams) == 6
-    unwrap(use_seams=True)
+    unwrap()
     assert all(is_cut(obj, index) for index in seams)
     assert_good(obj)
     unwrap(use_seams=False)  # borders may follow them, but there need not be any
@@ -325,7 +310,7 @@ def test_borders_follow_what_is_marked_unless_told_not_to(kind):
     before = fingerprint(obj)
     share = {}
     for follow in (True, False):
-        unwrap(**{f"follow_{kind}": follow})
+        unwrap(**{f"follow_{kind}": follow}, use_seams=False)
         assert_good(obj)
         share[follow] = sum(is_cut(obj, index) for index in around) / len(around)
     assert share[True] > 0.9 > 0.6 > share[False], share

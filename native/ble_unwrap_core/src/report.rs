@@ -89,12 +89,23 @@ impl Report {
     }
 }
 
+/// A number with its noun, and verb if there is one, in the singular or plural: of `[one, many]`.
+pub(crate) fn counted(count: usize, [one, many]: [&str; 2]) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::metrics::{Texture, UvMesh, measure};
     use crate::progress::Progress;
     use nalgebra::Point3;
+
+    #[test]
+    fn one_is_singular() {
+        let words = ["chart exceeds", "charts exceed"];
+        assert_eq!([0, 1, 2].map(|n| counted(n, words)), ["0 charts exceed", "1 chart exceeds", "2 charts exceed"]);
+    }
 
     #[test]
     fn charts_over_the_limit_are_listed_once() {

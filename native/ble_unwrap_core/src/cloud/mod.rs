@@ -48,6 +48,7 @@ use rayon::prelude::*;
 
 use crate::clock::Clock;
 use crate::progress::{Cancelled, Progress, Stage};
+use crate::report::counted;
 use crate::settings::Settings;
 
 pub use atlas::{CloudReport, PointAtlas, PointDefect};
@@ -269,28 +270,35 @@ fn report(
 fn warnings(report: &CloudReport, pieces: &[PieceCharts]) -> Vec<String> {
     let mut list = Vec::new();
     if report.unmapped_points > 0 {
-        list.push(format!("{} points have no finite position and got no UV", report.unmapped_points));
+        let points = counted(report.unmapped_points, ["point has", "points have"]);
+        list.push(format!("{points} no finite position and got no UV"));
     }
     if report.duplicate_points > 0 {
-        list.push(format!("{} points coincide with others and share their UV", report.duplicate_points));
+        let points = counted(
+            report.duplicate_points,
+            ["point coincides with another and shares its", "points coincide with others and share their"],
+        );
+        list.push(format!("{points} UV"));
     }
     let stray = pieces.iter().filter(|p| p.points.len() < 4).count();
     if stray > 0 {
         list.push(format!(
-            "{stray} pieces of fewer than 4 points, far from all others, got charts of their own; if they belong to the \
-             surface, raise the number of neighbours"
+            "{} of fewer than 4 points, far from all others, got charts of their own; if they belong to the surface, \
+             raise the number of neighbours",
+            counted(stray, ["piece", "pieces"])
         ));
     }
     if let Some(&(chart, l2)) = report.charts_over_limit.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
         list.push(format!(
-            "{} charts exceed the stretch limit, the worst is chart {chart} with {l2:.3}",
-            report.charts_over_limit.len()
+            "{} the stretch limit, the worst is chart {chart} with {l2:.3}",
+            counted(report.charts_over_limit.len(), ["chart exceeds", "charts exceed"])
         ));
     }
     if report.folded_points + report.overlaps > 0 {
         list.push(format!(
-            "{} points are folded over and {} pairs lie upon each other: the cloud is noisy or no surface there",
-            report.folded_points, report.overlaps
+            "{} folded over and {} upon each other: the cloud is noisy or no surface there",
+            counted(report.folded_points, ["point is", "points are"]),
+            counted(report.overlaps, ["pair lies", "pairs lie"])
         ));
     }
     list

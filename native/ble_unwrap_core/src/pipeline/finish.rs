@@ -13,7 +13,7 @@ use crate::mesh::{self, FaceId, MeshInput, Surface, measure};
 use crate::metrics::{self, Texture, UvMesh, UvMeshError};
 use crate::packing::{self, PackItem, Packed};
 use crate::progress::{Cancelled, Stage};
-use crate::report::Report;
+use crate::report::{Report, counted};
 use crate::rounding::{self, Rounding};
 use crate::segmentation;
 use crate::settings::{ChartScale, LimitOver, Settings};
@@ -75,8 +75,8 @@ pub(super) fn finish(
             report.warnings = warnings(surface, &layout, &certificate);
             if let Some(&(chart, l2)) = report.charts_over_limit.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
                 report.warnings.push(format!(
-                    "{} charts exceed the stretch limit, the worst is chart {chart} with {l2:.3}",
-                    report.charts_over_limit.len()
+                    "{} the stretch limit, the worst is chart {chart} with {l2:.3}",
+                    counted(report.charts_over_limit.len(), ["chart exceeds", "charts exceed"])
                 ));
             }
             if settings.limit_over == LimitOver::Atlas {
@@ -328,13 +328,16 @@ fn sorted(faces: &[FaceId]) -> Vec<FaceId> {
 fn warnings(surface: &Surface, layout: &Layout, certificate: &Certificate) -> Vec<String> {
     let mut list = surface.defects.warnings();
     if layout.specks > 0 {
-        list.push(format!("{} charts smaller than a texel were enlarged to one", layout.specks));
+        let specks = counted(layout.specks, ["chart smaller than a texel was", "charts smaller than a texel were"]);
+        list.push(format!("{specks} enlarged to one"));
     }
     if !certificate.is_valid() {
         list.push(format!(
-            "the result could not be proven free of overlap: {} flipped triangles, {} crossings in charts, {} between \
-             charts; raise the texture size or lower the margin",
-            certificate.flipped.count, certificate.crossings_inside.count, certificate.crossings_between.count
+            "the result could not be proven free of overlap: {}, {} in charts, {} between charts; raise the texture size \
+             or lower the margin",
+            counted(certificate.flipped.count, ["flipped triangle", "flipped triangles"]),
+            counted(certificate.crossings_inside.count, ["crossing", "crossings"]),
+            certificate.crossings_between.count
         ));
     }
     let area = measure::total_area(&surface.mesh);

@@ -1,0 +1,130 @@
+"""The certificate of the last run, for the panel, as long as it is true of what is in Blender.
+
+It is shown until one of its objects or maps is gone, a mesh has another number of corners, or undo has taken the UVs
+back; redo brings it back with them. Other edits of the UVs are not watched.
+"""
+
+import hashlib
+import json
+
+import bmesh
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, IntProperty, StringProperty
+
+from .mesh_arrays import crowded_edges, read_array
+
+# After undo the UVs are compared. In edit mode that takes a second a million corners: above this many it is not
+# tried, and the certificate is put away.
+MOST_EDITED_CORNERS = 200_000
+
+
+class BLEUnwrapCertificate(bpy.types.PropertyGroup):
+    """What the last run measured from the UVs that Blender holds; of this session only."""
+
+    title: StringProperty(name="Objects", options={"SKIP_SAVE"})
+    lines: StringProperty(name="Lines", description="JSON list of [status, text]", options={"SKIP_SAVE"})
+    maps: StringProperty(
+        name="Maps", description="JSON list of [object, session_uid, map, corners, digest]", options={"SKIP_SAVE"}
+    )
+    crowded: IntProperty(name="Edges", description="Edges with more than two faces", options={"SKIP_SAVE"})
+    holds: BoolProperty(name="Holds", description="The UVs are those that were measured", options={"SKIP_SAVE"})
+
+
+def show(context, title, lines, maps):
+    """Puts up a certificate; `maps` are the objects it is of, each with the name of its map."""
+    shown = context.window_manager.ble_unwrap_certificate
+    shown.title = title
+    shown.lines = json.dumps(lines)
+    shown.maps = json.dumps(
+        [(obj.name, obj.session_uid, name, _corner_count(obj), _digest(obj, name)) for obj, name in maps]
+    )
+    shown.crowded = sum(int(crowded_edges(obj.data).sum()) for obj, _ in maps if obj.type == "MESH")
+    shown.holds = True
+
+
+def clear(context):
+    """Takes the certificate away: another file is loaded."""
+    context.window_manager.ble_unwrap_certificate.property_unset("lines")
+
+
+def is_true(context):
+    """Whether there is a certificate and it is of what is there."""
+    shown = context.window_manager.ble_unwrap_certificate
+    return bool(shown.lines) and shown.holds and all(_is_there(*entry) for entry in json.loads(shown.maps))
+
+
+def objects(context):
+    """The objects that the certificate is of."""
+    entries = json.loads(context.window_manager.ble_unwrap_certificate.maps or "[]")
+    found = (_find(name, uid) for name, uid, *_ in entries)
+    return [obj for obj in found if obj is not None]
+
+
+def _find(name, uid):
+    obj = bpy.data.objects.get(name)
+    if obj is None or obj.session_uid != uid:
+        obj = next((other for other in bpy.data.objects if other.session_uid == uid), None)  # it was renamed
+    return obj if obj is not None and obj.users_scene else None
+
+
+def _is_there(name, uid, map_name, corners, _digest):
+    obj = _find(name, uid)
+    return obj is not None and map_name in obj.data.attributes and _corner_count(obj) == corners
+
+
+def _corner_count(obj):
+    """Face corners of a mesh; 0 where there are only points."""
+    return len(obj.data.loops) if obj.type == "MESH" else 0
+
+
+def _digest(obj, map_name):
+    """Digest of the UVs, or None where they cannot be read or it would take too long."""
+    data = obj.data
+    if obj.type == "MESH" and data.is_editmode:
+        obj.update_from_editmode()
+        faces = bmesh.from_edit_mesh(data).faces
+        layer = bmesh.from_edit_mesh(data).loops.layers.uv.get(map_name)
+        if layer is None or len(data.loops) > MOST_EDITED_CORNERS:
+            return None
+        uv = np.array([tuple(loop[layer].uv) for face in faces for loop in face.loops], np.float32)
+    else:
+        attribute = data.attributes.get(map_name)
+        if attribute is None or attribute.data_type != "FLOAT2":
+            return None
+        uv = read_array(attribute.data, "vector", np.float32, 2)
+    return hashlib.blake2b(np.ascontiguousarray(uv).tobytes(), digest_size=16).hexdigest()
+
+
+@bpy.app.handlers.persistent
+def compare(*_):
+    """After undo or redo: whether the UVs are again those that were measured."""
+    shown = bpy.context.window_manager.ble_unwrap_certificate
+    if not shown.lines:
+        return
+    shown.holds = all(
+        (obj := _find(name, uid)) is not None and digest is not None and _digest(obj, map_name) == digest
+        for name, uid, map_name, _, digest in json.loads(shown.maps)
+    )
+
+
+@bpy.app.handlers.persistent
+def forget(*_):
+    clear(bpy.context)
+
+
+HANDLERS = (("undo_post", compare), ("redo_post", compare), ("load_post", forget))
+
+
+def register():
+    bpy.utils.register_class(BLEUnwrapCertificate)
+    bpy.types.WindowManager.ble_unwrap_certificate = bpy.props.PointerProperty(type=BLEUnwrapCertificate)
+    for event, function in HANDLERS:
+        getattr(bpy.app.handlers, event).append(function)
+
+
+def unregister():
+    for event, function in HANDLERS:
+        getattr(bpy.app.handlers, event).remove(function)
+    del bpy.types.WindowManager.ble_unwrap_certificate
+    bpy.utils.unregister_class(BLEUnwrapCertificate)

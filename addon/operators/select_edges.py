@@ -1,0 +1,59 @@
+"""The operator `mesh.ble_unwrap_select_edges`: shows where the edges are that a warning is about."""
+
+import bmesh
+import bpy
+import numpy as np
+
+from .. import last_result
+from ..mesh_arrays import crowded_edges, read_array
+
+
+class MESH_OT_ble_unwrap_select_edges(bpy.types.Operator):
+    bl_idname = "mesh.ble_unwrap_select_edges"
+    bl_label = "Select Edges with More than Two Faces"
+    bl_description = "In Edit Mode, select the edges of the last result's meshes that more than two faces share"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not last_result.is_true(context):
+            cls.poll_message_set("Unwrap a mesh first")
+            return False
+        return True
+
+    def execute(self, context):
+        if context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        visible = [obj for obj in last_result.objects(context) if obj.type == "MESH" and obj.visible_get()]
+        found = {obj: shown for obj in visible if (shown := visible_crowded_edges(obj.data)).size}
+        if not found:
+            self.report({"WARNING"}, "Nothing that is visible has an edge with more than two faces")
+            return {"CANCELLED"}
+        for obj in context.view_layer.objects:
+            obj.select_set(obj in found)
+        context.view_layer.objects.active = next(iter(found))
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.select_mode(type="EDGE")
+        bpy.ops.mesh.select_all(action="DESELECT")
+        for obj, edges in found.items():
+            edit_mesh = bmesh.from_edit_mesh(obj.data)
+            edit_mesh.edges.ensure_lookup_table()
+            for index in edges:
+                edit_mesh.edges[index].select_set(True)
+            bmesh.update_edit_mesh(obj.data, loop_triangles=False, destructive=False)
+        count = sum(map(len, found.values()))
+        self.report({"INFO"}, f"{count:,} edge{'' if count == 1 else 's'} selected")
+        return {"FINISHED"}
+
+
+def visible_crowded_edges(mesh):
+    """Indices of the edges that more than two faces share and that edit mode would show."""
+    return np.flatnonzero(crowded_edges(mesh) & ~read_array(mesh.edges, "hide", bool))
+
+
+def register():
+    bpy.utils.register_class(MESH_OT_ble_unwrap_select_edges)
+
+
+def unregister():
+    bpy.utils.unregister_class(MESH_OT_ble_unwrap_select_edges)
