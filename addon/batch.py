@@ -215,7 +215,7 @@ def process(source, target, settings, arguments):
             add_baseline(asset, run, settings)
         saved = asset_io.save(target, source=source, cloud=written_cloud(run, outcomes), contents=contents)
         asset["out"] = str(target)
-        asset["warnings"] += saved.notes
+        asset["warnings"] = [text for text in asset["warnings"] if text not in saved.bare] + saved.notes
         broken = [text for outcome in outcomes for text in outcome.certificate.violations] + saved.bare
         asset["status"] = "violated" if broken else "ok"
         asset["error"] = "; ".join(broken) or None

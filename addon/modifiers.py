@@ -93,8 +93,8 @@ def realising_nodes():
     return tree
 
 
-def bare_faces(layer):
-    """The objects, by name, of which a view layer shows faces of meshes that have no UV map.
+def bare_faces(layer, owner=None):
+    """The objects, by name, of which a view layer shows faces of meshes that have no UV map; or that one `owner` alone.
 
     Such faces are what geometry nodes make, also where the object itself is points without faces. Texts and curves are
     left out: Blender gives those UVs of its own.
@@ -109,10 +109,19 @@ def bare_faces(layer):
         if key not in seen:
             seen[key] = bool(len(mesh.polygons)) and not len(mesh.uv_layers)
         if seen[key]:
-            owner = (entry.parent if entry.is_instance and entry.parent else obj).original
-            if owner.type in targets.TYPES:
-                found[owner.name] = owner
+            maker = (entry.parent if entry.is_instance and entry.parent else obj).original
+            if maker.type in targets.TYPES and owner in (None, maker):
+                found[maker.name] = maker
     return found
+
+
+def makes_faces(obj):
+    """Whether an object of points is shown with faces, which its geometry nodes have made of them."""
+    if not any(modifier.type == "NODES" and modifier.show_viewport for modifier in obj.modifiers):
+        return False
+    layer = bpy.context.view_layer
+    layer.update()
+    return obj.name in bare_faces(layer, owner=obj)
 
 
 def bare_text(name):

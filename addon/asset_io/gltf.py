@@ -1,5 +1,7 @@
 """glTF through Blender, so that what it cannot see of itself in a scene is kept: options by what the source file has."""
 
+from pathlib import Path
+
 import bpy
 
 from . import gltf_file
@@ -21,16 +23,21 @@ def export(name, *, separate, source):
     """Writes the scene by Blender's exporter; returns the operator's result."""
     options = {"export_format": "GLTF_SEPARATE" if separate else "GLB", "check_existing": False}
     options |= dict.fromkeys(("export_cameras", "export_lights", "export_extras", "export_attributes"), True)
+    if separate:  # images of one name in several assets of a folder would replace each other
+        options["export_texture_dir"] = f"{Path(name).stem}_textures"
     document = source_document(source)
     if gltf_file.entries(document, "skins"):
         # The importer takes the bind pose for the rest pose, and the nodes' own for the pose: that is what to write.
         options["export_rest_position_armature"] = False
+    attributes = {name for _, primitive in gltf_file.primitives(document) for name in gltf_file.attributes(primitive)}
+    if "JOINTS_1" in attributes:
+        options["export_all_influences"] = True
     if gltf_file.uses(document, gltf_file.INSTANCING):
         options["export_gpu_instances"] = True
     if gltf_file.uses(document, gltf_file.DRACO) and _can_compress():
         options["export_draco_mesh_compression_enable"] = True
         options |= {f"export_draco_{kind}_quantization": bits for kind, bits in DRACO_BITS.items()}
-    if any("COLOR_0" in gltf_file.attributes(primitive) for _, primitive in gltf_file.primitives(document)):
+    if "COLOR_0" in attributes:
         options |= {"export_vertex_color": "ACTIVE", "export_all_vertex_colors": True}
     known = bpy.ops.export_scene.gltf.get_rna_type().properties
     return bpy.ops.export_scene.gltf(filepath=name, **{key: options[key] for key in options if key in known})
@@ -45,8 +52,8 @@ def _can_compress():
     return dll_exists(quiet=True)
 
 
-def lost(source, path):
-    """What a glTF source has and the glTF file written from it has not, as notes."""
+def changes(source, path):
+    """What a glTF source has and the glTF file written from it has not, or has rounded, as notes."""
     if source is None or not {file_format(source), file_format(path)} <= set(FORMATS):
         return []
     before, after = (gltf_file.inventory(gltf_file.read_document(file)[0]) for file in (source, path))
@@ -60,6 +67,11 @@ def lost(source, path):
         notes.append("the input's compression by Draco was undone")
     if gltf_file.INSTANCING in gone:
         notes.append("the input's GPU instances were expanded to objects")
+    if gltf_file.DRACO in after["extensions"]:
+        bits = DRACO_BITS
+        notes.append(
+            f"compressed by Draco as the input was: UVs rounded to {bits['texcoord']} bits, positions to {bits['position']}"
+        )
     gone -= {gltf_file.DRACO, gltf_file.INSTANCING}
     if gone:
         notes.append(f"the output is without the input's {listed(sorted(gone))}, which Blender does not write")

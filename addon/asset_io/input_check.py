@@ -212,18 +212,19 @@ def _fbx(path, size):
         head = struct.Struct("<QQQB" if version >= 7500 else "<IIIB")
         try:
             _fbx_arrays(data, head, size)
-        except (struct.error, IndexError, zlib.error) as error:
-            raise AssetError(f"is cut short or damaged: {error}") from error
+        except (struct.error, IndexError, zlib.error) as error:  # beyond the end; or no compressed data
+            raise AssetError("is cut short or damaged") from error
 
 
 def _fbx_arrays(data, head, size):
-    position, total = 27, size
+    position, total, depth = 27, size, 0
     for _ in range(MOST_NODES):
-        if position + head.size > size:
-            return
         end, properties, length, name = head.unpack_from(data, position)
         position += head.size
-        if end == 0:  # ends the children of a node, or all
+        if end == 0:  # ends the children of a node, or the file's own nodes
+            if depth == 0:
+                return
+            depth -= 1
             continue
         position += name
         after = position + length
@@ -248,6 +249,8 @@ def _fbx_arrays(data, head, size):
             if position > after:
                 raise AssetError("is damaged: a property in it reaches beyond its node")
         position = after
+        depth += end > after
+    raise AssetError(f"has more than {MOST_NODES:,} nodes")
 
 
 def _unpacked_size(data, expected):

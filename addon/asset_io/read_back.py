@@ -26,10 +26,10 @@ class Expected:
     corners: int = 0
 
 
-def check(path, expected):
+def check(path, expected, *, together):
     """Names of meshes without UVs in a written file, where the format tells. Raises `AssetError` where it is cut short,
-    `OSError` where the system says that it could not be written."""
-    for file in path.parent.iterdir() if file_format(path) in ("obj", "gltf") else [path]:
+    `OSError` where the system says that it could not be written. `together`: all of its folder was written for it."""
+    for file in path.parent.rglob("*") if together else [path]:
         _synchronise(file)
     checks = {"blend": _blend, "glb": _gltf, "gltf": _gltf, "obj": _obj, "ply": _ply, "fbx": _fbx}
     return checks[file_format(path)](path, expected)

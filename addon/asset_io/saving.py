@@ -1,7 +1,9 @@
 """The scene into a file of a format: written under another name in the same folder, read back, then moved into place."""
 
+import re
 import secrets
 import shutil
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +22,7 @@ FILES_TOGETHER = ("obj", "gltf")
 class Saved:
     """What there is to say of a written file."""
 
-    notes: list  # what it has not, of what the input had
+    notes: list  # what of the input it has not, or has otherwise
     bare: list  # what has faces and no UVs in it
 
 
@@ -38,7 +40,7 @@ def save(path, *, source=None, cloud=None, contents=None):
     if path.is_dir():
         raise AssetError(f"cannot write {path}: there is a folder of that name")
     stem = f".ble_unwrap_{secrets.token_hex(4)}"
-    together = kind in FILES_TOGETHER
+    together = kind in FILES_TOGETHER or (kind == "fbx" and _has_packed_images())
     work = path.parent / stem / path.name if together else path.parent / f"{stem}.{kind}"
     try:
         work.parent.mkdir(parents=True, exist_ok=True)
@@ -53,8 +55,8 @@ def save(path, *, source=None, cloud=None, contents=None):
             raise AssetError("the exporter gave up")
         if kind == "obj":
             _relative_textures(work.with_suffix(".mtl"), path.parent)
-        found = read_back.check(work, contents.expected() if contents else read_back.Expected())
-        notes = gltf.lost(source, work)
+        found = read_back.check(work, contents.expected() if contents else read_back.Expected(), together=together)
+        notes = gltf.changes(source, work)
         _move(work, path, together)
     except Exception as error:  # exporters are add-ons and raise whatever they like
         text = error.strerror if isinstance(error, OSError) and error.strerror else reason(error)
@@ -76,12 +78,14 @@ def _disk(folder, error):
 
 def _move(work, path, together):
     """Moves what was written into place; the named file last, so that when it is there, all is there."""
-    companions = sorted(file for file in work.parent.iterdir() if file != work) if together else []
-    targets = [path.parent / file.name for file in companions]
+    folder = work.parent
+    files = sorted(file for file in folder.rglob("*") if file.is_file() and file != work) if together else []
+    targets = [path.parent / file.relative_to(folder) for file in files]
     for target in targets:
         if target.is_dir():
             raise AssetError(f"there is a folder of the name {target.name}")
-    for file, target in zip(companions, targets, strict=True):
+    for file, target in zip(files, targets, strict=True):
+        target.parent.mkdir(exist_ok=True)
         file.replace(target)
     work.replace(path)
 
@@ -91,16 +95,45 @@ def _export(path, kind, source):
     if kind == "blend":
         return bpy.ops.wm.save_as_mainfile(filepath=name, copy=True, check_existing=False, relative_remap=True)
     if kind == "obj":
-        return bpy.ops.wm.obj_export(
-            filepath=name, check_existing=False, export_materials=True, path_mode="ABSOLUTE", export_uv=True
-        )
+        with _unpacked_images(path):
+            return bpy.ops.wm.obj_export(
+                filepath=name, check_existing=False, export_materials=True, path_mode="ABSOLUTE", export_uv=True
+            )
     if kind == "ply":
         return bpy.ops.wm.ply_export(filepath=name, check_existing=False, export_uv=True, ascii_format=False)
     if kind == "fbx":
         enable("io_scene_fbx")
-        return bpy.ops.export_scene.fbx(filepath=name, check_existing=False)
+        embed = {"path_mode": "COPY", "embed_textures": True}
+        paths = embed if _has_packed_images() else {"path_mode": "RELATIVE"}
+        return bpy.ops.export_scene.fbx(filepath=name, check_existing=False, **paths)
     enable("io_scene_gltf2")
     return gltf.export(name, separate=kind == "gltf", source=source)
+
+
+def _has_packed_images():
+    return any(image.packed_file for image in bpy.data.images)
+
+
+@contextmanager
+def _unpacked_images(path):
+    """Files of the images that are packed in the scene, beside a file that is to name them.
+
+    Blender's exporter names a packed image by the last part of its path, and leaves writing it to others.
+    """
+    named = []
+    try:
+        for image in bpy.data.images:
+            if image.packed_file and image.users:
+                extension = Path(image.filepath_raw).suffix or f".{image.file_format.lower()}"
+                clean = re.sub(r"[^\w.-]", "_", image.name).removesuffix(extension)
+                file = path.parent / f"{path.stem}_{clean}{extension}"
+                file.write_bytes(image.packed_file.data)
+                named.append((image, image.filepath_raw))
+                image.filepath_raw = str(file)
+        yield
+    finally:
+        for image, before in named:
+            image.filepath_raw = before
 
 
 def _relative_textures(library, folder):
