@@ -16,8 +16,8 @@ class Run:
 
     Surfaces share one atlas (`one_atlas=False`: have one each); a cloud has a texture to itself. With `keep`, the
     analysis of the one atlas is kept for the next run. What cannot be written, or has neither faces nor enough points,
-    is left out as long as anything else is there, with a note unless it is empty. Raises what the tasks raise; whenever it does,
-    nothing was changed.
+    is left out as long as anything else is there, with a note unless it is empty. Raises what the tasks raise; whenever
+    it does, nothing was changed.
     """
 
     def __init__(self, objects, settings, *, threads=0, one_atlas=True, keep=False):

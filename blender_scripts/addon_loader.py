@@ -88,7 +88,7 @@ def leave(code):
 
 
 def remove_session_folder():
-    """Removes the folder that Blender makes in the temporary directory, as Blender itself does when it ends in order."""
+    """Removes the folder that Blender made in the temporary directory, as it does itself when it ends in order."""
     import bpy
 
     folder = Path(bpy.app.tempdir)

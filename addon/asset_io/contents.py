@@ -51,13 +51,23 @@ def prepare(target):
     """Makes the loaded scene ready for an output file: `Contents`. Raises `AssetError` where nothing is left."""
     kind = file_format(target)
     shapes = scene.bone_shapes()
-    if kind == "blend":
-        contents = _keep_all(kind, shapes)
-    else:
-        contents = _flatten(kind, shapes)
+    missing = _missing()
+    contents = _keep_all(kind, shapes) if kind == "blend" else _flatten(kind, shapes)
+    contents.notes += missing
     if not contents.objects:
         raise AssetError("; ".join(["holds no mesh that can be unwrapped", *contents.notes]))
     return contents
+
+
+def _missing():
+    """Notes about what is linked from files that are not there."""
+    pairs = {
+        (_library(item), item.name)
+        for kind in (bpy.data.objects, bpy.data.collections, bpy.data.meshes)
+        for item in kind
+        if item.is_missing
+    }
+    return [f"{listed(names)}: linked from {name}, which is missing" for name, names in _grouped(sorted(pairs)).items()]
 
 
 def _keep_all(kind, shapes):
@@ -74,8 +84,8 @@ def _keep_all(kind, shapes):
     remade.pop((), None)
     for names, of in remade.items():
         contents.notes.append(
-            f"{listed(of)}: the certificate is about the mesh without {listed(names)}, which stay as modifiers and make "
-            "other faces or UVs from it; apply them first to have what they make unwrapped"
+            f"{listed(of)}: the certificate is about the mesh without the modifiers {listed(names)}, which are kept "
+            "and make other faces or UVs of it; apply them first to have what they make unwrapped"
         )
     _place(objects)
     return contents
@@ -140,14 +150,14 @@ def _apply(objects, kind, notes):
         elif modifiers.to_apply(obj, keeps_pose) or obj.data.shape_keys:
             applied.append(obj)
     for names, of in _grouped((tuple(m.name for m in modifiers.remaking(obj)), obj.name) for obj in left).items():
-        notes.append(f"{listed(of)}: {listed(names)} left off, since applying modifiers would lose the shape keys")
+        notes.append(f"{listed(of)}: modifiers {listed(names)} left off, since applying them would lose the shape keys")
     for obj in left:
         for modifier in modifiers.remaking(obj):
             obj.modifiers.remove(modifier)
     made = _grouped((tuple(m.name for m in modifiers.to_apply(obj, keeps_pose)), obj.name) for obj in applied)
     for names, of in made.items():
         if names:
-            notes.append(f"{listed(of)}: {listed(names)} applied, and the result unwrapped")
+            notes.append(f"{listed(of)}: modifiers {listed(names)} applied, and the result unwrapped")
     if applied:
         with scene.evaluated(applied) as layer:
             modifiers.apply(applied, layer, keeps_pose=keeps_pose)

@@ -1,4 +1,4 @@
-"""glTF through Blender, so that what it cannot see of itself in a scene is kept: options by what the source file has."""
+"""glTF through Blender, so that what it leaves out by itself is kept: options by what the source file has."""
 
 from pathlib import Path
 
@@ -68,10 +68,8 @@ def changes(source, path):
     if gltf_file.INSTANCING in gone:
         notes.append("the input's GPU instances were expanded to objects")
     if gltf_file.DRACO in after["extensions"]:
-        bits = DRACO_BITS
-        notes.append(
-            f"compressed by Draco as the input was: UVs rounded to {bits['texcoord']} bits, positions to {bits['position']}"
-        )
+        uv, position = DRACO_BITS["texcoord"], DRACO_BITS["position"]
+        notes.append(f"compressed by Draco as the input was: UVs rounded to {uv} bits, positions to {position}")
     gone -= {gltf_file.DRACO, gltf_file.INSTANCING}
     if gone:
         notes.append(f"the output is without the input's {listed(sorted(gone))}, which Blender does not write")

@@ -79,7 +79,7 @@ def external_uris(document):
     for kind in ("buffer", "image"):
         for entry in entries(document, kind + "s"):
             uri = entry.get("uri")
-            if isinstance(uri, str) and not uri[:5].lower() == "data:":
+            if isinstance(uri, str) and uri[:5].lower() != "data:":
                 found.append((kind, uri))
     return found
 

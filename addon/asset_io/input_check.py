@@ -6,7 +6,6 @@ in its own folder), declares more than it can hold, or would take more than `MOS
 """
 
 import mmap
-import os
 import re
 import stat
 import struct
@@ -38,7 +37,7 @@ def regular_size(path, name=None):
     """Bytes of an ordinary file; `AssetError` for a device, a pipe, a folder, or nothing."""
     what = f"names {name!r}, which" if name else ""
     try:
-        found = os.stat(path)
+        found = Path(path).stat()
     except FileNotFoundError as error:
         raise AssetError(f"{what} is missing" if name else "no such file") from error
     except (OSError, ValueError) as error:

@@ -8,7 +8,6 @@ import mmap
 import os
 import re
 from dataclasses import dataclass
-from pathlib import Path
 
 from . import gltf_file, ply_header
 from .formats import AssetError, file_format

@@ -1,4 +1,4 @@
-"""The scene into a file of a format: written under another name in the same folder, read back, then moved into place."""
+"""The scene into a file of a format: written under another name in its folder, read back, then moved into place."""
 
 import re
 import secrets

@@ -1,4 +1,4 @@
-"""Files from others: nothing in them runs, nothing outside them is read, nothing is allocated that they only declare."""
+"""Files from others: nothing in them runs, nothing outside is read, nothing is allocated that they only declare."""
 
 import base64
 import json
@@ -121,7 +121,7 @@ def test_devices_and_pipes_are_refused(addon, tmp_path):
 @pytest.mark.parametrize(
     "header",
     [
-        "format binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z",
+        "format binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y",
         "format ascii 1.0\nelement vertex 400000000\nproperty float x\nproperty float y\nproperty float z",
         "format ascii 1.0\nelement vertex 1\nproperty float x\nelement face 99999999999\nproperty list uchar int v",
     ],

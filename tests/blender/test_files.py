@@ -1,4 +1,4 @@
-"""Files in and out: paths that still lead somewhere, everything in the output mapped, nothing lost when a disk is full."""
+"""Files in and out: paths still lead somewhere, all of the output is mapped, nothing is lost when a disk is full."""
 
 import json
 import os
@@ -66,7 +66,7 @@ def link_object(path, name):
 
 
 def nodes(*kinds):
-    """Geometry nodes of the kinds, one after the other, by their first sockets but for instances of a cube on points."""
+    """Geometry nodes of the kinds, one after the other by their first sockets; what is instanced is a small cube."""
     tree = bpy.data.node_groups.new("nodes", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
@@ -195,7 +195,9 @@ def test_what_modifiers_make_is_unwrapped_and_written(addon, tmp_path, kind):
     code, asset = process(addon, tmp_path, source, tmp_path / f"out/a.{kind}")
     assert code == 0, asset
     assert sum(entry["measured"]["faces"] for entry in asset["objects"]) == 24 + 1536
-    assert "Boxes: Mirror and Array applied" in notes(asset) and "Ball: Subdivision applied" in notes(asset)
+    assert "Boxes: modifiers Mirror and Array applied" in notes(
+        asset
+    ) and "Ball: modifiers Subdivision applied" in notes(asset)
     faces = 2 * 24 + 2 * 1536 if kind in ("glb", "gltf") else 24 + 1536
     assert faces_with_uvs(tmp_path / f"out/a.{kind}") == faces
     selected = [obj for obj in bpy.context.view_layer.objects if obj.type == "MESH"]
@@ -208,7 +210,7 @@ def test_a_blend_keeps_modifiers_and_says_what_is_certified(addon, tmp_path):
     source = save_blend(tmp_path / "a.blend")
     code, asset = process(addon, tmp_path, source, tmp_path / "out")
     assert code == 0, asset
-    assert "Boxes: the certificate is about the mesh without Mirror and Array" in notes(asset)
+    assert "Boxes: the certificate is about the mesh without the modifiers Mirror and Array" in notes(asset)
     assert "Cast" not in notes(asset), "it moves vertices only"
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out/a.blend"))
     assert [m.type for m in bpy.data.objects["Boxes"].modifiers] == ["MIRROR", "ARRAY"]
@@ -238,7 +240,7 @@ def test_shape_keys_and_bones_are_not_lost_to_modifiers(addon, tmp_path, kind):
     if kind in ("obj", "ply"):
         assert triangles == 24 + 24
         return
-    assert "Keyed: Mirror left off, since applying modifiers would lose the shape keys" in notes(asset)
+    assert "Keyed: modifiers Mirror left off, since applying them would lose the shape keys" in notes(asset)
     assert triangles == 12 + 24
     by_name = {obj.name: obj for obj in bpy.data.objects if obj.type == "MESH"}
     assert [key.name for key in by_name["Keyed"].data.shape_keys.key_blocks][1:] == ["up"]
@@ -364,7 +366,7 @@ def test_missing_library_is_named(addon, tmp_path):
     link_object(library, "Linked")
     source = save_blend(tmp_path / "a.blend")
     library.unlink()
-    code, asset = process(addon, tmp_path, source, tmp_path / "out/a.glb")
+    _, asset = process(addon, tmp_path, source, tmp_path / "out/a.glb")
     assert asset["objects"][0]["names"] == ["Own"]
     assert "lib.blend" in notes(asset) and "missing" in notes(asset)
 
