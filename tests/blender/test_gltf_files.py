@@ -52,7 +52,7 @@ def test_skin_whose_nodes_are_not_in_bind_pose_stays_where_it_is(addon, tmp_path
 
 def test_bone_shapes_take_no_place_in_the_atlas(addon, tmp_path):
     """The importer makes an icosphere for bones to look like; it had 80 faces of the atlas and was not written."""
-    before, after, asset = converted(addon, tmp_path, gltf_samples.skinned())
+    _, after, asset = converted(addon, tmp_path, gltf_samples.skinned())
     assert asset["objects"][0]["names"] == ["bar"]
     assert asset["objects"][0]["measured"]["faces"] == 32
     assert [mesh["name"] for mesh in after[0]["meshes"]] == ["mesh0"]
@@ -87,7 +87,7 @@ def test_more_than_four_influences_are_kept(addon, tmp_path):
     inverse = np.tile(np.eye(4, dtype=np.float32), (5, 1, 1))
     inverse[1:, 3, 1] = -2.0
     made.document["skins"][0]["inverseBindMatrices"] = made.accessor(inverse)
-    _, (document, _), asset = converted(addon, tmp_path, made)
+    _, (document, _), _ = converted(addon, tmp_path, made)
     assert "WEIGHTS_1" in document["meshes"][0]["primitives"][0]["attributes"]
 
 
