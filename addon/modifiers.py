@@ -19,6 +19,11 @@ def remaking(obj):
     return [m for m in obj.modifiers if m.show_viewport and m.type not in KEEP_CORNERS]
 
 
+def off_in_viewport(obj):
+    """The modifiers that make other faces or UVs, but only when Blender renders."""
+    return [m for m in obj.modifiers if m.show_render and not m.show_viewport and m.type not in KEEP_CORNERS]
+
+
 def kept(modifier, keeps_pose):
     """Whether a modifier stays when the others are applied: bones where the file has them, and particles."""
     return modifier.type == "PARTICLE_SYSTEM" or (keeps_pose and modifier.type == "ARMATURE")

@@ -88,6 +88,10 @@ def _keep_all(kind, shapes):
             "and make other faces or UVs of it; apply them first to have what they make unwrapped"
         )
     _place(objects)
+    used = {obj.data for obj in bpy.data.objects if obj.type == "MESH"}
+    unused = [mesh.name for mesh in bpy.data.meshes if mesh.users and mesh.polygons and mesh not in used]
+    if unused:
+        contents.notes.append(f"{listed(unused)}: meshes of no object, which were left as they are")
     return contents
 
 
@@ -143,6 +147,9 @@ def _drop(shapes):
 def _apply(objects, kind, notes):
     keeps_pose = kind in POSED_FORMATS
     applied, left = [], []
+    off = _grouped((tuple(m.name for m in modifiers.off_in_viewport(obj)), obj.name) for obj in objects)
+    off.pop((), None)
+    notes += [f"{listed(of)}: modifiers {listed(names)} left off, as in the viewport" for names, of in off.items()]
     for obj in objects:
         if keeps_pose and obj.data.shape_keys:
             if modifiers.remaking(obj):
@@ -167,12 +174,15 @@ def _convert(objects, notes):
     """Turns texts, curves and the like that have faces into meshes, in the same place of the scene."""
     if not objects:
         return
+    made = []
     with scene.evaluated(objects) as layer:
         graph = layer.depsgraph
-        made = [
-            (obj, bpy.data.meshes.new_from_object(obj.evaluated_get(graph), depsgraph=graph), obj.matrix_world.copy())
-            for obj in objects
-        ]
+        for obj in objects:
+            try:
+                mesh = bpy.data.meshes.new_from_object(obj.evaluated_get(graph), depsgraph=graph)
+            except RuntimeError:  # all of a family of metaballs is in the mesh of the first
+                continue
+            made.append((obj, mesh, obj.matrix_world.copy()))
     converted = []
     for obj, mesh, matrix in made:
         if not mesh.polygons:
