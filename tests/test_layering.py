@@ -233,7 +233,7 @@ NEVER = {
     # What looks at files from others or reads them back needs no Blender, so that nothing is opened by it.
     **{
         f"asset_io/{name}.py": {"bpy", "bmesh"}
-        for name in ("formats", "gltf_file", "input_check", "ply_header", "read_back")
+        for name in ("formats", "gltf_file", "input_check", "ply_header", "read_back", "zstd_frames")
     },
     "modifiers.py": {".engine", "ble_unwrap_native"},
     "targets.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},

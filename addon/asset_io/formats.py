@@ -1,5 +1,6 @@
 """Names of file formats, what each can hold, and the error that all of reading and writing raises."""
 
+import re
 from pathlib import Path
 
 INPUT_FORMATS = ("blend", "obj", "glb", "gltf", "ply", "stl", "fbx")
@@ -39,9 +40,10 @@ def reason(error):
     if not lines:
         return type(error).__name__
     if any(line.startswith(("Traceback", "Error: Python: Traceback")) for line in lines):
-        name, _, text = next((line for line in reversed(lines) if "Error" in line.split(":")[0]), lines[-1]).partition(
-            ": "
-        )
+        told = next((line for line in reversed(lines) if "Error" in line.split(":")[0]), lines[-1])
+        name, _, text = told.partition(": ")
+        if system := re.match(r"\[Errno \d+\] (.*)", text):
+            return system[1]
         return f"Blender's own code for this format failed on it ({name.rsplit('.', 1)[-1]}: {text or 'no details'})"
     return lines[-1].removeprefix("Error: ")
 

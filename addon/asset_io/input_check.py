@@ -12,13 +12,12 @@ import struct
 import zlib
 from pathlib import Path
 
-from . import gltf_file, ply_header
+from . import gltf_file, ply_header, zstd_frames
 from .formats import AssetError, file_format
 
 # Bytes of an input with the files that belong to it, unpacked: about a hundred million triangles. The tightest of the
 # formats, .glb, ends at half of it.
 MOST_BYTES = 8 << 30
-ZSTD_BLOCK = 128 << 10  # bytes that a block unpacks to at most
 UNPACKED_AT_ONCE = 1 << 20  # bytes
 
 
@@ -81,7 +80,7 @@ def _blend(path, size):
         if magic[:2] == b"\x1f\x8b":
             stream.seek(0)
             _within_bound(_gzip_size(stream))
-        elif magic == b"\x28\xb5\x2f\xfd":
+        elif magic == zstd_frames.MAGIC:
             _within_bound(_zstd_size(stream, size))
 
 
@@ -101,32 +100,12 @@ def _gzip_size(stream):
 
 
 def _zstd_size(stream, size):
-    """Bytes that the frames of a Zstandard file unpack to at most, by the headers of their blocks."""
-    total = position = 0
-    while position + 8 <= size and total <= MOST_BYTES:
-        stream.seek(position)
-        magic, word = struct.unpack("<II", stream.read(8))
-        if magic & 0xFFFFFFF0 == 0x184D2A50:  # a frame that is skipped: the table of the others
-            position += 8 + word
-            continue
-        if magic != 0xFD2FB528:
-            raise AssetError("its compressed data is damaged")
-        flags = word & 0xFF
-        single = flags >> 5 & 1
-        position += 5 + (not single) + (0, 1, 2, 4)[flags & 3] + (single, 2, 4, 8)[flags >> 6]
-        last = 0
-        while not last:
-            stream.seek(position)
-            head = stream.read(3)
-            if len(head) < 3:
-                raise AssetError("is cut short")
-            block = int.from_bytes(head, "little")
-            last, kind, length = block & 1, block >> 1 & 3, block >> 3
-            total += ZSTD_BLOCK if kind == 2 else length
-            position += 3 + (1 if kind == 1 else length)
-            if total > MOST_BYTES:
-                break
-        position += 4 * (flags >> 2 & 1)
+    """Bytes that a Zstandard file unpacks to at most; not counted beyond the bound."""
+    total = 0
+    for block in zstd_frames.blocks(stream, size):
+        total += block or 0
+        if total > MOST_BYTES:
+            break
     return total
 
 

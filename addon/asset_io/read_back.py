@@ -7,9 +7,10 @@ geometry: it costs little beside the writing.
 import mmap
 import os
 import re
+from collections import deque
 from dataclasses import dataclass
 
-from . import gltf_file, ply_header
+from . import gltf_file, ply_header, zstd_frames
 from .formats import AssetError, file_format
 
 CUT_SHORT = "what was written is cut short"
@@ -48,9 +49,15 @@ def _tail(path, size):
 
 
 def _blend(path, _expected):
-    tail = _tail(path, max(BLOCK_HEADS))
+    size = path.stat().st_size
     with path.open("rb") as stream:
-        is_packed = stream.read(7) != b"BLENDER"
+        is_packed = stream.read(len(zstd_frames.MAGIC)) == zstd_frames.MAGIC
+        try:
+            if is_packed and list(deque(zstd_frames.blocks(stream, size), 1)) != [None]:
+                raise AssetError("its last frame is no table")
+        except AssetError as error:
+            raise AssetError(CUT_SHORT) from error
+    tail = _tail(path, max(BLOCK_HEADS))
     if not is_packed and not any(tail[-head:][:4] == b"ENDB" for head in BLOCK_HEADS):
         raise AssetError(CUT_SHORT)
     return []

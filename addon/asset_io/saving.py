@@ -60,7 +60,7 @@ def save(path, *, source=None, cloud=None, contents=None):
         _move(work, path, together)
     except Exception as error:  # exporters are add-ons and raise whatever they like
         text = error.strerror if isinstance(error, OSError) and error.strerror else reason(error)
-        raise AssetError(f"cannot write {path}: {text}{_disk(path.parent, error)}") from error
+        raise AssetError(f"cannot write {path}: {text}{_disk(path.parent)}") from error
     finally:
         for left in path.parent.glob(f"{stem}*"):
             shutil.rmtree(left, ignore_errors=True) if left.is_dir() else left.unlink(missing_ok=True)
@@ -68,10 +68,11 @@ def save(path, *, source=None, cloud=None, contents=None):
     return Saved(notes, (contents.bare() if contents else []) + bare)
 
 
-def _disk(folder, error):
-    """What there is to say about the disk when something could not be written whole."""
-    free = shutil.disk_usage(folder).free
-    if not isinstance(error, OSError) and read_back.CUT_SHORT not in str(error) and free > 64 * MEGABYTE:
+def _disk(folder):
+    """How full the disk is: what exporters say of a full one is seldom that it is full."""
+    try:
+        free = shutil.disk_usage(folder).free
+    except OSError:
         return ""
     return f" (the disk of {folder} has {free / MEGABYTE:,.0f} MB free)"
 
