@@ -1,5 +1,6 @@
 """The scene into a file of a format: written under another name in its folder, read back, then moved into place."""
 
+import os
 import re
 import secrets
 import shutil
@@ -144,7 +145,7 @@ def _relative_textures(library, folder):
     paths = {}
     for image in bpy.data.images:
         if image.filepath:
-            absolute = Path(bpy.path.abspath(image.filepath, library=image.library)).as_posix()
+            absolute = os.path.normpath(bpy.path.abspath(image.filepath, library=image.library)).replace("\\", "/")
             try:
                 paths[absolute] = bpy.path.relpath(absolute, start=str(folder)).removeprefix("//").replace("\\", "/")
             except ValueError:  # on another drive

@@ -465,7 +465,7 @@ def test_full_disk(addon, tmp_path, kind):
         assert [file.name for file in disk.iterdir()] == [old.name]
         assert old.read_bytes() == b"the old output"
     finally:
-        subprocess.run(["umount", disk], check=True)
+        subprocess.run(["umount", "--lazy", disk], check=True)
 
 
 def test_folder_in_place_of_the_output(addon, tmp_path):
