@@ -1,5 +1,7 @@
 """What modifiers make of a mesh: named, and applied where a file is to hold what they make."""
 
+import hashlib
+
 import bpy
 import numpy as np
 
@@ -45,7 +47,7 @@ def apply(objects, layer, *, keeps_pose):
     try:
         for obj in objects:
             for modifier in obj.modifiers:
-                if modifier.show_viewport and kept(modifier, keeps_pose):
+                if modifier.show_viewport and modifier.type == "ARMATURE" and kept(modifier, keeps_pose):
                     modifier.show_viewport = False
                     switched.append(modifier)
             if any(modifier.type == "NODES" for modifier in to_apply(obj, keeps_pose)):
@@ -80,9 +82,11 @@ def apply(objects, layer, *, keeps_pose):
 
 
 def _digest(mesh):
-    """What tells two results of the same mesh apart."""
-    positions = np.round(mesh_bridge.read_positions(mesh), 6).tobytes()
-    return mesh_bridge.fingerprint(mesh), hash(positions)
+    """What tells two results of the same mesh apart: corners, places and materials."""
+    digest = hashlib.blake2b(mesh_bridge.fingerprint(mesh), digest_size=16)
+    digest.update(mesh_bridge.read_positions(mesh).tobytes())
+    digest.update(mesh_bridge.read_array(mesh.polygons, "material_index", np.int32).tobytes())
+    return digest.digest()
 
 
 def realising_nodes():

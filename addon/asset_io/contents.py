@@ -13,7 +13,7 @@ import bpy
 
 from .. import modifiers, targets
 from . import scene
-from .formats import POSED_FORMATS, AssetError, file_format, listed
+from .formats import POSED_FORMATS, AssetError, file_format, listed, named
 from .read_back import Expected
 
 
@@ -84,8 +84,8 @@ def _keep_all(kind, shapes):
     remade.pop((), None)
     for names, of in remade.items():
         contents.notes.append(
-            f"{listed(of)}: the certificate is about the mesh without the modifiers {listed(names)}, which are kept "
-            "and make other faces or UVs of it; apply them first to have what they make unwrapped"
+            f"{listed(of)}: the certificate is about the mesh without {named('modifier', names)}: kept, but what "
+            "is made of the mesh there has other faces or UVs; apply first to have that unwrapped"
         )
     _place(objects)
     used = {obj.data for obj in bpy.data.objects if obj.type == "MESH"}
@@ -149,22 +149,20 @@ def _apply(objects, kind, notes):
     applied, left = [], []
     off = _grouped((tuple(m.name for m in modifiers.off_in_viewport(obj)), obj.name) for obj in objects)
     off.pop((), None)
-    notes += [f"{listed(of)}: modifiers {listed(names)} left off, as in the viewport" for names, of in off.items()]
+    notes += [f"{listed(of)}: {named('modifier', names)} left off, as in the viewport" for names, of in off.items()]
     for obj in objects:
-        if keeps_pose and obj.data.shape_keys:
-            if modifiers.remaking(obj):
-                left.append(obj)
-        elif modifiers.to_apply(obj, keeps_pose) or obj.data.shape_keys:
-            applied.append(obj)
-    for names, of in _grouped((tuple(m.name for m in modifiers.remaking(obj)), obj.name) for obj in left).items():
-        notes.append(f"{listed(of)}: modifiers {listed(names)} left off, since applying them would lose the shape keys")
+        if modifiers.to_apply(obj, keeps_pose) or (obj.data.shape_keys and not keeps_pose):
+            (left if keeps_pose and obj.data.shape_keys else applied).append(obj)
+    kept_off = _grouped((tuple(m.name for m in modifiers.to_apply(obj, keeps_pose)), obj.name) for obj in left)
+    for names, of in kept_off.items():
+        notes.append(f"{listed(of)}: {named('modifier', names)} left off: applied, the shape keys would be lost")
     for obj in left:
-        for modifier in modifiers.remaking(obj):
+        for modifier in modifiers.to_apply(obj, keeps_pose):
             obj.modifiers.remove(modifier)
     made = _grouped((tuple(m.name for m in modifiers.to_apply(obj, keeps_pose)), obj.name) for obj in applied)
     for names, of in made.items():
         if names:
-            notes.append(f"{listed(of)}: modifiers {listed(names)} applied, and the result unwrapped")
+            notes.append(f"{listed(of)}: {named('modifier', names)} applied, and the result unwrapped")
     if applied:
         with scene.evaluated(applied) as layer:
             modifiers.apply(applied, layer, keeps_pose=keeps_pose)
@@ -193,7 +191,7 @@ def _convert(objects, notes):
         converted.append(obj.name)
         _replace(obj, mesh, matrix)
     if converted:
-        notes.append(f"{listed(converted)}: made a mesh of, and unwrapped")
+        notes.append(f"{listed(converted)}: turned into a mesh, and unwrapped")
 
 
 def _replace(obj, mesh, matrix):
@@ -211,11 +209,10 @@ def _replace(obj, mesh, matrix):
         inverse = child.matrix_parent_inverse.copy()
         child.parent = new
         child.matrix_parent_inverse = inverse
-    data = obj.data
-    bpy.data.objects.remove(obj)
+    for collection in obj.users_collection:  # not removed: others may follow it as their path
+        collection.objects.unlink(obj)
+    obj.name = f"{name} before"
     new.name = mesh.name = name
-    if data and not data.users:
-        bpy.data.curves.remove(data) if isinstance(data, bpy.types.Curve) else bpy.data.metaballs.remove(data)
 
 
 def _grouped(pairs):

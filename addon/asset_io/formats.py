@@ -48,6 +48,12 @@ def reason(error):
     return lines[-1].removeprefix("Error: ")
 
 
+def named(noun, names):
+    """Names after the word for what they are: "modifier A", "modifiers A and B"."""
+    names = list(names)
+    return f"{noun}{'' if len(names) == 1 else 's'} {listed(names)}"
+
+
 def listed(names, most=5):
     """Names as a list in a sentence; the first few where there are many."""
     names = list(names)

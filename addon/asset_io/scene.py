@@ -79,10 +79,11 @@ def make_local():
     Collections come first: what only they use becomes local in place then, instead of being copied.
     """
     libraries = (bpy.data.collections, bpy.data.objects, bpy.data.meshes, bpy.data.curves, bpy.data.pointclouds)
-    for _ in range(len(bpy.data.collections) + 1):  # a collection within another is local after it
-        linked = [item for library in libraries for item in library if item.library is not None]
-        if not linked:
+    before = None
+    while linked := [item for library in libraries for item in library if item.library is not None]:
+        if before is not None and len(linked) >= before:  # the rest is used by what stays linked, and has been copied
             return
+        before = len(linked)
         for item in linked:
-            if item.id_data is not None and item.library is not None:
+            if item.library is not None:
                 item.make_local()

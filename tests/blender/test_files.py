@@ -197,7 +197,7 @@ def test_what_modifiers_make_is_unwrapped_and_written(addon, tmp_path, kind):
     assert sum(entry["measured"]["faces"] for entry in asset["objects"]) == 24 + 1536
     assert "Boxes: modifiers Mirror and Array applied" in notes(
         asset
-    ) and "Ball: modifiers Subdivision applied" in notes(asset)
+    ) and "Ball: modifier Subdivision applied" in notes(asset)
     faces = 2 * 24 + 2 * 1536 if kind in ("glb", "gltf") else 24 + 1536
     assert faces_with_uvs(tmp_path / f"out/a.{kind}") == faces
     selected = [obj for obj in bpy.context.view_layer.objects if obj.type == "MESH"]
@@ -210,7 +210,7 @@ def test_a_blend_keeps_modifiers_and_says_what_is_certified(addon, tmp_path):
     source = save_blend(tmp_path / "a.blend")
     code, asset = process(addon, tmp_path, source, tmp_path / "out")
     assert code == 0, asset
-    assert "Boxes: the certificate is about the mesh without the modifiers Mirror and Array" in notes(asset)
+    assert "Boxes: the certificate is about the mesh without modifiers Mirror and Array" in notes(asset)
     assert "Cast" not in notes(asset), "it moves vertices only"
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out/a.blend"))
     assert [m.type for m in bpy.data.objects["Boxes"].modifiers] == ["MIRROR", "ARRAY"]
@@ -240,7 +240,7 @@ def test_shape_keys_and_bones_are_not_lost_to_modifiers(addon, tmp_path, kind):
     if kind in ("obj", "ply"):
         assert triangles == 24 + 24
         return
-    assert "Keyed: modifiers Mirror left off, since applying them would lose the shape keys" in notes(asset)
+    assert "Keyed: modifier Mirror left off: applied, the shape keys would be lost" in notes(asset)
     assert triangles == 12 + 24
     by_name = {obj.name: obj for obj in bpy.data.objects if obj.type == "MESH"}
     assert [key.name for key in by_name["Keyed"].data.shape_keys.key_blocks][1:] == ["up"]
@@ -308,6 +308,28 @@ def test_every_mesh_of_the_output_has_uvs(addon, tmp_path, kind):
     addon("asset_io").load(tmp_path / f"out/a.{kind}")
     meshes = [mesh for mesh in bpy.data.meshes if mesh.polygons and mesh.users]
     assert meshes and all(mesh.uv_layers for mesh in meshes)
+
+
+@pytest.mark.parametrize("kind", ["glb", "obj"])
+def test_curve_turned_into_a_mesh_is_still_a_path(addon, tmp_path, kind):
+    """A flat circle is filled, so it is written with faces; the cube that goes around it must stay where it is."""
+    bpy.ops.curve.primitive_bezier_circle_add(radius=4)
+    circle = bpy.context.object
+    circle.data.dimensions, circle.data.fill_mode = "2D", "BOTH"
+    follower = cube("Follower", 0.5)
+    constraint = follower.constraints.new("FOLLOW_PATH")
+    constraint.target, constraint.use_fixed_location, constraint.offset_factor = circle, True, 0.25
+    bpy.context.view_layer.update()
+    place = follower.matrix_world.translation.copy()
+    assert place.length == pytest.approx(4, abs=0.1)
+    code, asset = process(addon, tmp_path, save_blend(tmp_path / "a.blend"), tmp_path / f"out/a.{kind}")
+    assert code == 0, asset
+    assert sorted(asset["objects"][0]["names"]) == ["BezierCircle", "Follower"]
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    addon("asset_io").load(tmp_path / f"out/a.{kind}")
+    written = bpy.data.objects["Follower"]
+    corners = np.array([written.matrix_world @ vertex.co for vertex in written.data.vertices])
+    assert np.allclose(corners.mean(axis=0), place, atol=1e-3)
 
 
 def test_size_of_what_is_not_shown_counts(addon, tmp_path):
