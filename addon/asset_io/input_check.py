@@ -114,7 +114,7 @@ def _zstd_size(stream, size):
 # Blank of an OBJ file within a line: a backslash at the end of a line goes on with the next one.
 _BLANK = rb"(?:[ \t]|\\\r?\n)"
 _REST = rb"((?:[^\r\n\\]|\\(?!\r?\n)|\\\r?\n)*)"
-_LIBRARY = re.compile(rb"(?m)^" + _BLANK + rb"*mtllib" + _BLANK + rb"+" + _REST)
+_LIBRARY = re.compile(rb"mtllib" + _BLANK + rb"+" + _REST)
 _TEXTURE = re.compile(rb"(?mi)^[ \t]*(?:map_\w+|bump|norm|disp|decal|refl)[ \t]+([^\r\n]*)")
 MATERIAL_BYTES = 1 << 30  # of one .mtl file
 MOST_OPTIONS = 32  # words before the name of a texture; the format has eleven options of up to four words
@@ -126,7 +126,7 @@ def _obj(path, size):
     names = {Path(path).with_suffix(".mtl").name}  # which Blender reads even where it is not named
     if size:
         with Path(path).open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            names |= {_text(match[1]) for match in _LIBRARY.finditer(data)}
+            names |= set(_libraries(data))
     for name in sorted(names):
         for library in (folder / part for part in _ways_to_read(name)):
             if not _is_there(library) or library.is_dir():
@@ -138,6 +138,15 @@ def _obj(path, size):
                     texture = library.parent / part
                     if _is_there(texture) and not texture.is_dir():  # an option's word may be the name of a folder
                         regular_size(texture, part)
+
+
+def _libraries(data):
+    """The rest of every line of an OBJ file that may name a material library; also of a comment, which does no harm."""
+    at = data.find(b"mtllib")
+    while at >= 0:
+        if match := _LIBRARY.match(data, at):
+            yield _text(match[1])
+        at = data.find(b"mtllib", at + 1)
 
 
 def _text(data):

@@ -15,6 +15,7 @@ from .formats import AssetError, file_format
 
 CUT_SHORT = "what was written is cut short"
 FBX_END = bytes.fromhex("f85a8c6adef5d97eece90ce3758f290b")
+CHUNK = 1 << 24  # bytes that are looked through at once
 BLOCK_HEADS = (24, 32)  # bytes of the last block of a .blend, which is nothing but a head, until 5.0 and since
 
 
@@ -110,14 +111,12 @@ def _obj(path, expected):
     if not path.stat().st_size or _tail(path, 1) != b"\n":
         raise AssetError(CUT_SHORT)
     with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        faces = sum(1 for _ in re.finditer(rb"(?m)^f ", data))
-        materials = {match[1] for match in re.finditer(rb"(?m)^usemtl (.+)$", data)}
-        bare, name = [], path.stem
-        for match in re.finditer(rb"(?m)^(?:o (.*)|f \d+(?:/(\d*))?.*)$", data):
-            if match[1] is not None:
-                name = match[1].decode("utf-8", "replace").strip()
-            elif not match[2] and name not in bare[-1:]:
-                bare.append(name)
+        # One line begins where another ends; a chunk begins with the last two bytes of the one before.
+        chunks = (data[max(0, at - 2) : at + CHUNK] for at in range(0, len(data), CHUNK))
+        faces = sum(chunk.count(b"\nf ") for chunk in chunks)
+        materials = {data[at + 8 : data.find(b"\n", at + 1)].strip() for at in places(data, b"\nusemtl ")} - {b""}
+        # Blender writes normals: a corner without UVs is a vertex and a normal with nothing in between.
+        bare = _objects_without_uvs(data, path.stem) if data.find(b"//") >= 0 else []
     if faces < expected.faces:
         raise AssetError(CUT_SHORT)
     library = path.with_suffix(".mtl")
@@ -126,3 +125,21 @@ def _obj(path, expected):
     if not materials <= known or (materials and not defined.endswith(b"\n")):
         raise AssetError(f"{CUT_SHORT}: {library.name}")
     return bare
+
+
+def places(data, text):
+    """Where a text begins in mapped memory, one place after the other."""
+    at = data.find(text)
+    while at >= 0:
+        yield at
+        at = data.find(text, at + 1)
+
+
+def _objects_without_uvs(data, name):
+    found = []
+    for match in re.finditer(rb"(?m)^(?:o (.*)|f \d+(?:/(\d*))?.*)$", data):
+        if match[1] is not None:
+            name = match[1].decode("utf-8", "replace").strip()
+        elif not match[2] and name not in found[-1:]:
+            found.append(name)
+    return found

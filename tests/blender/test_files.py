@@ -315,6 +315,7 @@ def test_curve_turned_into_a_mesh_is_still_a_path(addon, tmp_path, kind):
     """A flat circle is filled, so it is written with faces; the cube that goes around it must stay where it is."""
     bpy.ops.curve.primitive_bezier_circle_add(radius=4)
     circle = bpy.context.object
+    circle.name = "Path"
     circle.data.dimensions, circle.data.fill_mode = "2D", "BOTH"
     follower = cube("Follower", 0.5)
     constraint = follower.constraints.new("FOLLOW_PATH")
@@ -324,7 +325,7 @@ def test_curve_turned_into_a_mesh_is_still_a_path(addon, tmp_path, kind):
     assert place.length == pytest.approx(4, abs=0.1)
     code, asset = process(addon, tmp_path, save_blend(tmp_path / "a.blend"), tmp_path / f"out/a.{kind}")
     assert code == 0, asset
-    assert sorted(asset["objects"][0]["names"]) == ["BezierCircle", "Follower"]
+    assert sorted(asset["objects"][0]["names"]) == ["Follower", "Path"]
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     addon("asset_io").load(tmp_path / f"out/a.{kind}")
     written = bpy.data.objects["Follower"]
