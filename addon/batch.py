@@ -203,16 +203,20 @@ def process(source, target, settings, arguments):
     try:
         # These formats split vertices wherever normals or UVs differ.
         settings = {"weld": asset_io.file_format(source) in asset_io.SPLIT_FORMATS, **settings}
-        objects, notes = unwrapped_objects(targets.unique_data(asset_io.load(source)), target)
+        asset_io.load(source)
+        contents = asset_io.prepare(target)
+        objects, notes = unwrapped_objects(targets.unique_data(contents.objects), target)
         run, outcomes = run_objects(objects, settings, threads=arguments.threads, one_atlas=arguments.atlas == "asset")
         asset["objects"] = [describe(task, outcome) for task, outcome in zip(run.tasks, outcomes, strict=True)]
-        asset["warnings"] = notes + [text for outcome in outcomes for text in outcome.certificate.warnings]
+        warnings = [text for outcome in outcomes for text in outcome.certificate.warnings]
+        asset["warnings"] = contents.notes + notes + warnings
         asset["summary"] = "; ".join(outcome.summary for outcome in outcomes)
         if arguments.compare:
             add_baseline(asset, run, settings)
-        asset_io.save(target, cloud=written_cloud(run, outcomes))
+        saved = asset_io.save(target, source=source, cloud=written_cloud(run, outcomes), contents=contents)
         asset["out"] = str(target)
-        broken = [text for outcome in outcomes for text in outcome.certificate.violations]
+        asset["warnings"] = [text for text in asset["warnings"] if text not in saved.bare] + saved.notes
+        broken = [text for outcome in outcomes for text in outcome.certificate.violations] + saved.bare
         asset["status"] = "violated" if broken else "ok"
         asset["error"] = "; ".join(broken) or None
     except USER_ERRORS as error:

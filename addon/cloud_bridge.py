@@ -46,8 +46,7 @@ def read_cloud(obj, *, only_selected=False):
     Returns None where no point is chosen. Raises `MeshError` where the attribute could not be written.
     """
     data = obj.data
-    if not data.is_editable:
-        raise MeshError(f"{obj.name}: its points are linked from another file and cannot be changed")
+    check_writable(obj)
     if obj.type == "MESH" and obj.mode == "EDIT":
         obj.update_from_editmode()
     positions = point_positions(data)
@@ -73,6 +72,12 @@ def read_cloud(obj, *, only_selected=False):
         fingerprint=digest,
         warnings=[f"{obj.name}: {note}"] if note else [],
     )
+
+
+def check_writable(obj):
+    """Raises `MeshError` where the attribute could not be written."""
+    if not obj.data.is_editable:
+        raise MeshError(f"{obj.name}: its points are linked from another file and cannot be changed")
 
 
 def too_few(cloud):

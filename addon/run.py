@@ -1,6 +1,6 @@
 """All that one press of the button does: the surfaces together, then every cloud by itself, written all or none."""
 
-from . import cloud_bridge, engine, targets
+from . import cloud_bridge, engine, mesh_bridge, modifiers, targets
 from .cloud_task import CloudTask
 from .mesh_bridge import MeshError, NothingToUnwrap
 from .task import UnwrapTask, finished
@@ -15,9 +15,9 @@ class Run:
     """Reads all objects when made, then computes (`run` or `start`), then writes (`write`).
 
     Surfaces share one atlas (`one_atlas=False`: have one each); a cloud has a texture to itself. With `keep`, the
-    analysis of the one atlas is kept for the next run. `by_uv` as in `faces.chosen_faces`. What has neither faces nor
-    enough points is left out as long as anything else is there, with a note where there are some points. Raises what
-    the tasks raise; whenever it does, nothing was changed.
+    analysis of the one atlas is kept for the next run. `by_uv` as in `faces.chosen_faces`. What cannot be written, or has
+    neither faces nor enough points, is left out as long as anything else is there, with a note unless it is empty.
+    Raises what the tasks raise; whenever it does, nothing was changed.
     """
 
     def __init__(self, objects, settings, *, threads=0, one_atlas=True, keep=False, by_uv=False):
@@ -27,6 +27,7 @@ class Run:
                 obj.update_from_editmode()  # faces may have been made or deleted since edit mode was entered
         self.tasks, self.notes = [], []
         reasons = []
+        objects, refused = _writable(objects, make_new_map=settings.get("uv_map") == "NEW")
         surfaces = [obj for obj in objects if targets.is_surface(obj)]
         for group in [surfaces] if one_atlas and surfaces else [[obj] for obj in surfaces]:
             try:
@@ -41,8 +42,11 @@ class Run:
                 self.notes.append(short)
             else:
                 self.tasks.append(CloudTask(cloud, settings, threads=threads))
+                if modifiers.makes_faces(obj):
+                    self.notes.append(modifiers.bare_text(obj.name))
         if not self.tasks:
-            raise MeshError(next(iter([*self.notes, *reasons]), None) or _why_nothing(objects))
+            raise MeshError(next(iter([*refused, *self.notes, *reasons]), None) or _why_nothing(objects))
+        self.notes += [f"{text}; it was left out" for text in refused]
 
     @property
     def element_count(self):
@@ -154,6 +158,21 @@ class RunJob:
         """Raises what went wrong so far, if anything did."""
         if self._error is not None:
             raise self._error
+
+
+def _writable(objects, *, make_new_map):
+    """The objects whose maps can be written, and why the others' cannot."""
+    writable, refused = [], []
+    for obj in objects:
+        try:
+            if targets.is_surface(obj):
+                mesh_bridge.check_writable(obj, make_new_map)
+            elif targets.is_cloud(obj):
+                cloud_bridge.check_writable(obj)
+            writable.append(obj)
+        except MeshError as error:
+            refused.append(str(error))
+    return writable, refused
 
 
 def _named(task, call):

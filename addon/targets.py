@@ -2,6 +2,7 @@
 
 EDIT_MODES = ("EDIT_MESH", "EDIT_POINTCLOUD")
 TYPES = ("MESH", "POINTCLOUD")
+CONVERTIBLE = ("CURVE", "FONT", "META", "SURFACE")  # which Blender shows, and most files hold, as meshes
 
 
 def is_surface(obj):

@@ -5,6 +5,7 @@
 import importlib
 import importlib.util
 import os
+import shutil
 import sys
 import traceback
 from pathlib import Path
@@ -80,6 +81,16 @@ def leave(code):
     sys.stdout.flush()
     sys.stderr.flush()
     if is_module():
+        remove_session_folder()
         # Blender 4.2 as a Python module crashes in its own static destructors when panels are registered.
         os._exit(code)
     sys.exit(code)
+
+
+def remove_session_folder():
+    """Removes the folder that Blender made in the temporary directory, as it does itself when it ends in order."""
+    import bpy
+
+    folder = Path(bpy.app.tempdir)
+    if folder.name.startswith("blender_"):  # it is the temporary directory itself where none could be made
+        shutil.rmtree(folder, ignore_errors=True)
