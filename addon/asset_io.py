@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 
-from . import cloud_bridge, point_file, targets
+from . import cloud_bridge, input_file, point_file, targets
 
 INPUT_FORMATS = ("blend", "obj", "glb", "gltf", "ply", "stl", "fbx")
 OUTPUT_FORMATS = ("blend", "glb", "obj", "fbx", "ply")
@@ -55,8 +55,8 @@ def load(path):
     kind = file_format(path)
     if kind not in INPUT_FORMATS:
         raise AssetError(f"cannot read '.{kind}' files; known are {', '.join(INPUT_FORMATS)}")
-    if not path.is_file():
-        raise AssetError("no such file")
+    if problem := input_file.why_unreadable(path):
+        raise AssetError(problem)
     try:
         if kind == "blend":
             done = _replace_scene(lambda: bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False))

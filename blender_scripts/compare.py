@@ -38,16 +38,16 @@ def compare_objects(objects, name, out, settings, *, threads=0, picture_size=900
 def main(argv):
     batch, asset_io = addon_loader.load("batch"), addon_loader.load("asset_io")
     engine, bridge = addon_loader.load("engine"), addon_loader.load("mesh_bridge")
-    targets = addon_loader.load("targets")
+    targets, arguments = addon_loader.load("targets"), addon_loader.load("batch_arguments")
     parser = argparse.ArgumentParser(prog="compare.py", description="BLE Unwrap against Smart UV Project.")
     parser.add_argument("inputs", nargs="+", metavar="IN")
     parser.add_argument("-o", "--output", required=True, metavar="OUTDIR")
     parser.add_argument("--picture-size", type=int, default=900, help="pixels of one layout (default: 900)")
     parser.add_argument("--blend", action=argparse.BooleanOptionalAction, default=True, help="also write a .blend")
     parser.add_argument("--threads", type=int, default=0)
-    batch.add_setting_arguments(parser)
+    arguments.add_setting_arguments(parser)
     options = parser.parse_args(argv)
-    settings = batch.settings_of(options, parser)
+    settings = arguments.settings_of(options, parser)
     if not 64 <= options.picture_size <= 8192:
         parser.error("--picture-size must be between 64 and 8192")
     out = Path(options.output)
@@ -79,7 +79,7 @@ def main(argv):
             print(f"{name}: {error}", file=sys.stderr, flush=True)
     if models:
         print("", *tables.table(models), "", sep="\n")
-    batch.write_json(out / "compare.json", {"params": settings, "models": models, "failed": failed})
+    addon_loader.load("batch_report").write_json(out / "compare.json", {"params": settings, "models": models, "failed": failed})
     print(f"written to {out}/")
     if failed:
         return batch.SOME_FAILED
