@@ -110,7 +110,7 @@ def process_all(plan, settings, arguments, earlier, report, stop):
 
 
 def process(planned, settings, arguments, evidence, stop):
-    """Unwraps one file; what goes wrong is in the result. Raises `Stopped` alone, and leaves the output as it was then."""
+    """Unwraps one file; what goes wrong is in the result. Raises `Stopped` alone, with the output as it was."""
     source, target = planned.source, planned.target
     asset = {"in": str(source), "out": None, "status": "failed", "error": None, "summary": "", "objects": []}
     started = time.perf_counter()
@@ -130,7 +130,9 @@ def process(planned, settings, arguments, evidence, stop):
             progress=lambda _fraction, _stage: stop.check(),
         )
         asset["objects"] = [describe(task, outcome) for task, outcome in zip(run.tasks, outcomes, strict=True)]
-        asset["warnings"] = planned.notes + notes + [text for outcome in outcomes for text in outcome.certificate.warnings]
+        asset["warnings"] = (
+            planned.notes + notes + [text for outcome in outcomes for text in outcome.certificate.warnings]
+        )
         asset["summary"] = "; ".join(outcome.summary for outcome in outcomes)
         if arguments.compare:
             add_baseline(asset, run, settings)

@@ -26,8 +26,8 @@ def plan_outputs(inputs, output, *, kind=None, overwrite=False, written_before=f
     """A `Planned` for each input, in their order, and notes about all of them. Raises `PlanError`.
 
     `output` is a directory, or a file for a single input; `kind` the format of all results (default: the input's own).
-    Results lie flat in the directory, each under its input's name. Where inputs of several folders would meet there, all
-    results lie in the inputs' folders below the one they have in common; where inputs of one folder would meet
+    Results lie flat in the directory, each under its input's name. Where inputs of several folders would meet there,
+    all results lie in the inputs' folders below the one they have in common; where inputs of one folder would meet
     (`model.stl` and `model.glb`, both written as .glb), one of them gets a longer name, and a note.
 
     A file that exists is replaced if it was named itself, has the input's own name, or is in `written_before`, pairs of
@@ -36,10 +36,7 @@ def plan_outputs(inputs, output, *, kind=None, overwrite=False, written_before=f
     output, notes = Path(output), []
     sources = _without_repeats([Path(name) for name in inputs], notes)
     as_file = _is_file_name(output, sources, kind)
-    if as_file:
-        plan = [Planned(sources[0], output)]
-    else:
-        plan = _planned_in_directory(sources, output, kind, notes)
+    plan = [Planned(sources[0], output)] if as_file else _planned_in_directory(sources, output, kind, notes)
     taken = {_identity(source): source for source in sources}
     for planned in plan:
         if _identity(planned.target) == _identity(planned.source):
@@ -96,7 +93,7 @@ def _is_file_name(output, sources, kind):
 
 def _planned_in_directory(sources, output, kind, notes):
     names = [f"{source.stem}.{kind or asset_io.default_output_format(source)}" for source in sources]
-    folders = [os.path.abspath(source.parent) for source in sources]
+    folders = [os.path.normpath(source.parent.absolute()) for source in sources]
     folder_of = {}
     for name, folder in zip(names, folders, strict=True):
         folder_of.setdefault(os.path.normcase(name), set()).add(folder)

@@ -16,10 +16,10 @@ SHARE_OF_TIME = 0.05
 
 
 class ReportFile:
-    """The report of one run. `head` is what it says of the run; `earlier` are assets of previous runs, see `earlier_assets`.
+    """The report of one run. `head` is what it says of the run; `earlier` are assets of previous ones, `earlier_assets`.
 
-    Assets of previous runs that this one has not done anew stay in the report as `earlier`, so that nothing known is lost
-    when this run is stopped, too.
+    Assets of previous runs that this one has not done anew stay in the report as `earlier`, so that nothing known is
+    lost when this run is stopped, too.
     """
 
     def __init__(self, path, head, earlier):
@@ -37,7 +37,7 @@ class ReportFile:
         self._journal = journal_of(self.path).open("w", encoding="utf-8")  # what was in it is in `earlier`
 
     def add(self, asset):
-        """Adds a finished asset. Raises `OSError` where that could not be written; a later writing will hold it, too."""
+        """Adds a finished asset. Raises `OSError` where that could not be written; a later writing holds it, too."""
         self._assets.append(_text(asset))
         self._earlier.pop(pair_of(asset), None)
         self._counts["assets"] += 1

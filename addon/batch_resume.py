@@ -45,7 +45,9 @@ class Evidence:
         return {
             "key": self.key,
             "read": _relative(read, planned.source.parent) | {planned.source.name: digest},
-            "written": _relative({path: self.digest(path) for path in written_files(planned.target)}, planned.target.parent),
+            "written": _relative(
+                {path: self.digest(path) for path in written_files(planned.target)}, planned.target.parent
+            ),
         }
 
     def is_done(self, planned, asset):
@@ -76,14 +78,14 @@ def external_files():
 
     Blender's own are left out, as its version stands for them. Of a sequence of images the first one is named.
     """
-    own = Path(bpy.utils.resource_path("LOCAL")).resolve()
+    own = os.path.realpath(bpy.utils.resource_path("LOCAL"))
     found = {}
     for name in bpy.utils.blend_paths(absolute=True, packed=False, local=False):
         path = Path(name)
         if "<UDIM>" in path.name or "<UVTILE>" in path.name:
             pattern = path.name.replace("<UDIM>", "*").replace("<UVTILE>", "*")
             found |= dict.fromkeys(sorted(path.parent.glob(pattern)))
-        elif not path.resolve().is_relative_to(own):
+        elif not Path(os.path.realpath(path)).is_relative_to(own):
             found[path] = None
     return list(found)
 

@@ -1,4 +1,7 @@
-"""Files as they lie on disk: what can be read, which other files a file names, and digests of all. Standard library only."""
+"""Files as they lie on disk: what can be read, which other files a file names, and digests of all.
+
+Standard library only.
+"""
 
 import errno
 import hashlib

@@ -1,4 +1,4 @@
-"""The wheel carries the licences of everything that is compiled into it, and so does the extension, which holds the wheel.
+"""The wheel carries the licences of all that is compiled into it, and so does the extension, which holds the wheel.
 
 What must be in it is asked of `cargo tree`, by another way than that of the script which writes the file.
 """
@@ -101,7 +101,7 @@ def package(tmp_path, licence, files=(), authors=("A. Uthor <a@example.org>",)):
 def test_crate_without_a_text_gets_that_of_mit_or_fails_the_build(script, tmp_path):
     (text,) = script["texts_of"](package(tmp_path, "MIT OR Apache-2.0"))
     assert "Copyright (c) A. Uthor\n" in text and "WITHOUT WARRANTY OF ANY KIND" in text
-    with pytest.raises(SystemExit, match="some 1.0.0 says 'MPL-2.0'"):
+    with pytest.raises(SystemExit, match=r"some 1\.0\.0 says 'MPL-2\.0'"):
         script["texts_of"](package(tmp_path, "MPL-2.0"))
     with pytest.raises(SystemExit, match="says ''"):
         script["texts_of"](package(tmp_path, None))
