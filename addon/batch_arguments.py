@@ -82,9 +82,9 @@ def make_parser():
         + ".",
         epilog="Results lie flat in the directory OUT; where inputs of several folders have the same name, in the same "
         "folders as these. An existing file is replaced if it has its input's own name or the report lists it as its "
-        "result; else only with --overwrite. Meshes get a UV map, points an attribute of two floats; of the files .blend "
-        "and .ply keep the latter. Exit codes: 0 all fine, 1 some assets failed, 2 usage, 3 environment, 4 a certificate "
-        "does not hold, 5 stopped by a signal.",
+        "result; else only with --overwrite. Meshes get a UV map, points an attribute of two floats; of the files "
+        ".blend and .ply keep the latter. Exit codes: 0 all fine, 1 some assets failed, 2 usage, 3 environment, 4 a "
+        "certificate does not hold, 5 stopped by a signal.",
     )
     parser.add_argument("inputs", nargs="+", metavar="IN", help="files to unwrap")
     parser.add_argument("-o", "--output", required=True, metavar="OUT", help="directory, or a file for a single input")

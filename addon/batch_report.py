@@ -16,7 +16,7 @@ SHARE_OF_TIME = 0.05
 
 
 class ReportFile:
-    """The report of one run. `head` is what it says of the run; `earlier` are assets of previous ones, `earlier_assets`.
+    """The report of one run. `head` is what it says of the run; `earlier` are assets of previous ones.
 
     Assets of previous runs that this one has not done anew stay in the report as `earlier`, so that nothing known is
     lost when this run is stopped, too.

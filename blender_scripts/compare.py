@@ -40,7 +40,7 @@ def compare_objects(objects, name, out, settings, *, threads=0, picture_size=900
 
 
 def xatlas_row(objects, settings):
-    """What is measured of a layout by xatlas of the same objects, at the same margin. Raises `xatlas_peer.Unavailable`."""
+    """The measurement of a layout by xatlas of the same objects. Raises `xatlas_peer.Unavailable`."""
     engine, bridge = addon_loader.load("engine"), addon_loader.load("mesh_bridge")
     properties = addon_loader.load("properties")
     full = {**properties.default_values(settings.get("preset", "DEFAULT")), **settings}
