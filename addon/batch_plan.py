@@ -33,18 +33,18 @@ def plan_outputs(inputs, output, *, kind=None, overwrite=False, written_before=f
     A file that exists is replaced if it was named itself, has the input's own name, or is in `written_before`, pairs of
     input and output of earlier runs; anything else only with `overwrite`.
     """
-    output, notes = Path(output), []
-    sources = _without_repeats([Path(name) for name in inputs], notes)
+    output, notes, places = Path(output), [], _Places()
+    sources = _without_repeats([Path(name) for name in inputs], places, notes)
     as_file = _is_file_name(output, sources, kind)
     plan = [Planned(sources[0], output)] if as_file else _planned_in_directory(sources, output, kind, notes)
-    taken = {_identity(source): source for source in sources}
     for planned in plan:
-        if _identity(planned.target) == _identity(planned.source):
+        if places.of(planned.target) == places.of(planned.source):
             raise PlanError(f"{planned.source} would be overwritten by its own result: give another -o")
     # Results under their input's own name come first, so that these keep it.
     for planned in sorted(plan, key=lambda planned: planned.target.name != planned.source.name):
-        _take_free_name(planned, taken, as_file)
-        taken |= dict.fromkeys(map(_identity, files_of(planned.target)), planned.source)
+        _take_free_name(planned, places, as_file)
+        for file in files_of(planned.target):
+            places.take(file, planned.source)
         known = (str(planned.source), str(planned.target)) in written_before
         if not (as_file or overwrite or known or planned.target.name == planned.source.name):
             planned.problem = _why_not_replaced(planned)
@@ -58,21 +58,49 @@ def files_of(target):
 
 def is_among(path, plan):
     """Whether a path is an input or an output of a plan."""
-    files = [file for planned in plan for file in (planned.source, *files_of(planned.target))]
-    return _identity(path) in set(map(_identity, files))
+    places = _Places()
+    files = (file for planned in plan for file in (planned.source, *files_of(planned.target)))
+    return places.of(Path(path)) in set(map(places.of, files))
 
 
-def _identity(path):
-    """The same text for paths that lead to the same place; never raises, not for a loop of links either."""
-    return os.path.normcase(os.path.realpath(path))
+class _Places:
+    """Where paths lead to, and which of these places are inputs or results: the input that each belongs to.
+
+    Never fails, not for a loop of links either.
+    """
+
+    def __init__(self):
+        self._folders = {}  # each is looked up once
+        self._holders = {}
+
+    def of(self, path):
+        """A text that is the same for all paths to a place."""
+        if path.is_symlink() or path.name in ("", ".."):
+            return os.path.normcase(os.path.realpath(path))
+        if path.parent not in self._folders:
+            self._folders[path.parent] = os.path.realpath(path.parent)
+        return os.path.normcase(f"{self._folders[path.parent]}{os.sep}{path.name}")
+
+    def take(self, path, source):
+        self._holders[self.of(path)] = source
+
+    def holder(self, target):
+        """The input that has one of the files of a result, as itself or as its own result, or None."""
+        return next((holder for file in files_of(target) if (holder := self._holders.get(self.of(file)))), None)
+
+    def __len__(self):
+        return len(self._holders)
 
 
-def _without_repeats(sources, notes):
+def _without_repeats(sources, places, notes):
+    """The inputs, taken, each place once."""
     found = {}
     for source in sources:
-        if _identity(source) in found:
-            notes.append(f"{source} is the same file as {found[_identity(source)]}: unwrapped once")
-        found.setdefault(_identity(source), source)
+        first = found.setdefault(places.of(source), source)
+        if first is not source:
+            notes.append(f"{source} is the same file as {first}: unwrapped once")
+    for source in found.values():
+        places.take(source, source)
     return list(found.values())
 
 
@@ -110,24 +138,19 @@ def _planned_in_directory(sources, output, kind, notes):
     ]
 
 
-def _take_free_name(planned, taken, as_file):
+def _take_free_name(planned, places, as_file):
     """Gives the result a longer name where another input or result has its own."""
     wanted = planned.target
-    holder = _holder(wanted, taken)
+    holder = places.holder(wanted)
     if holder is None:
         return
     if as_file:
         raise PlanError(f"-o {wanted} would overwrite {holder}")
-    # Each file that is taken stands in the way of one name only, so one of these is free.
-    numbers = itertools.chain([""], (f".{number}" for number in range(2, len(taken) + 3)))
+    # Each place that is taken stands in the way of one name only, so one of these is free.
+    numbers = itertools.chain([""], (f".{number}" for number in range(2, len(places) + 3)))
     longer = (wanted.with_name(f"{planned.source.name}{number}{wanted.suffix}") for number in numbers)
-    planned.target = next(target for target in longer if _holder(target, taken) is None)
+    planned.target = next(target for target in longer if places.holder(target) is None)
     planned.notes.append(f"{wanted} is taken by {holder}: written to {planned.target}")
-
-
-def _holder(target, taken):
-    """The input that has one of the files of a result, as itself or as its own result."""
-    return next((taken[_identity(file)] for file in files_of(target) if _identity(file) in taken), None)
 
 
 def _why_not_replaced(planned):

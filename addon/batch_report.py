@@ -38,11 +38,12 @@ class ReportFile:
 
     def add(self, asset):
         """Adds a finished asset. Raises `OSError` where that could not be written; a later writing holds it, too."""
-        self._assets.append(_text(asset))
+        text = _text(asset)
+        self._assets.append(text)
         self._earlier.pop(pair_of(asset), None)
         self._counts["assets"] += 1
         self._counts[asset["status"]] += 1
-        self._journal.write(_line(asset))
+        self._journal.write(text + "\n")
         self._journal.flush()
         if time.monotonic() >= self._due:
             self._write("running", {})
@@ -122,11 +123,8 @@ def _replace(path, parts):
 
 
 def _text(value):
-    return json.dumps(_plain(value), indent=1, allow_nan=False)
-
-
-def _line(value):
-    return json.dumps(_plain(value), allow_nan=False) + "\n"
+    """JSON on one line, so that a report lists an asset a line, as its journal does."""
+    return json.dumps(_plain(value), allow_nan=False)
 
 
 def _plain(value):

@@ -254,15 +254,20 @@ def test_other_version_is_done_anew(addon, batch, files, monkeypatch):
     assert_done_anew(batch, [files("a.obj")], lambda: monkeypatch.setattr(addon("engine"), "version", lambda: "9.9"))
 
 
+DAMAGES = {
+    "emptied": lambda path: path.write_bytes(b""),
+    "one byte": lambda path: path.write_bytes(path.read_bytes()[:-1] + b"?"),
+    "gone": lambda path: path.unlink(),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
 @pytest.mark.parametrize("kind", ["obj", "glb"])
-def test_damaged_output_is_made_anew(batch, files, tmp_path, kind):
+def test_damaged_output_is_made_anew(batch, files, tmp_path, kind, damage):
     cube()
-    source = files(f"a.{kind}")
-    out = tmp_path / "out" / source.name
-    assert_done_anew(batch, [source], lambda: out.write_bytes(b""))
-    assert out.stat().st_size > 0
-    assert_done_anew(batch, [source], lambda: out.write_bytes(out.read_bytes()[:-1] + b"?"))
-    assert_done_anew(batch, [source], out.unlink)
+    out = tmp_path / "out" / f"a.{kind}"
+    assert_done_anew(batch, [files(f"a.{kind}")], lambda: DAMAGES[damage](out))
+    assert out.stat().st_size > 1
 
 
 def test_materials_beside_an_output_are_part_of_it(batch, files, tmp_path):
