@@ -6,6 +6,7 @@ xatlas gets `Unavailable` with a sentence that says so.
 python xatlas_peer.py IN.npz OUT.npz is that process.
 """
 
+import math
 import os
 import subprocess
 import sys
@@ -41,8 +42,8 @@ class PeerAtlas:
 def unwrap(positions, triangles, *, margin, texture_size, timeout=TIMEOUT):
     """An atlas by xatlas, its charts cut by its defaults, of triangles as (t, 3) indices into (n, 3) positions.
 
-    `margin` is the distance of charts in texels. xatlas makes a texture of a size of its own, which it tries to bring
-    near that of a square as long as the longer side of `texture_size`. Raises `Unavailable`.
+    `margin` is the distance that charts have at least, in texels. xatlas makes a texture of a size of its own, which it
+    tries to bring near that of a square as long as the longer side of `texture_size`. Raises `Unavailable`.
     """
     with tempfile.TemporaryDirectory(prefix="ble_xatlas_") as work:
         given, made = Path(work) / "given.npz", Path(work) / "made.npz"
@@ -50,7 +51,7 @@ def unwrap(positions, triangles, *, margin, texture_size, timeout=TIMEOUT):
             given,
             positions=np.asarray(positions, np.float32),
             triangles=np.asarray(triangles, np.uint32).reshape(-1, 3),
-            padding=round(margin),
+            padding=math.ceil(margin / 2),  # xatlas keeps it around every chart, so twice between two
             resolution=max(texture_size),
         )
         try:

@@ -21,7 +21,7 @@ def terrain(cells=40, seed=3):
     for octave in range(4):
         for _ in range(3):
             wave, phase = random.normal(size=2) * 4 * 2**octave, random.uniform(0, 2 * np.pi)
-            height += 0.06 / 2**octave * np.abs(np.sin(wave[0] * x + wave[1] * y + phase))
+            height += 0.02 / 2**octave * np.abs(np.sin(wave[0] * x + wave[1] * y + phase))
     corner = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
     quads = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1).reshape(-1, 4)
     return shapes.of_polygons("terrain", np.stack([x, y, height], axis=-1).reshape(-1, 3), quads)

@@ -20,7 +20,7 @@ import xatlas_peer  # noqa: E402
 
 MARGIN, TEXTURE_SIZE = 4, 1024
 # L2 stretch of each of our charts at most, see above.
-LIMIT = 1.02
+LIMIT = 1.006
 # Of these, what xatlas says of itself is compared with what we measure, without a margin, which it counts as used.
 MEASURED = ("sculpt", "gear", "table", "vase", "soup", "terrain")
 
@@ -80,19 +80,21 @@ def test_we_say_of_xatlas_what_it_says(name):
 
 def test_a_uv_divided_by_width_and_height_is_measured_in_texels():
     """The size of its texture is part of what xatlas returns: by another one the same layout is stretched."""
-    arrays = triangles_of(peer_meshes.terrain())
+    arrays = triangles_of(peer_meshes.shapes.rectangle())
     peer, measured = by_xatlas(arrays, MARGIN)
     width, height = peer.texture_size
-    assert width > 1.5 * height
+    assert max(width, height) > 2 * min(width, height), (
+        "a rectangle of 3 by 1 is packed into one of its own proportions"
+    )
     as_square = native.measure(*arrays, peer.uv, texture_size=TEXTURE_SIZE, margin=MARGIN)
-    assert as_square["l2"] > 1.2 * measured["l2"]
+    assert measured["l2"] == pytest.approx(1, abs=1e-3) and as_square["l2"] > 1.25
 
 
 def test_ours_hold_what_is_promised(both):
-    for name, (ours, _theirs) in both.items():
+    for name, (ours, theirs) in both.items():
         assert (ours["flips"], ours["overlaps"], ours["unmapped_faces"]) == (0, 0, 0), name
         assert ours["l2_worst_chart"] <= LIMIT + 1e-3, name
-        assert ours["gap_texels"] >= MARGIN - 0.01, name
+        assert min(ours["gap_texels"], theirs["gap_texels"]) >= MARGIN - 0.01, name
 
 
 def test_fewer_charts_and_shorter_seams_at_no_more_stretch(both):
@@ -110,8 +112,8 @@ def test_fewer_charts_and_shorter_seams_at_no_more_stretch(both):
         print(f"{name:14}", *(f"{key} {a[key]:.4g} {b[key]:.4g}" for key in (*mean, "overlaps", "flips")), sep="  ")
     print(mean)
     assert mean["l2"][0] <= mean["l2"][1]
-    assert mean["charts"][0] < 0.8 * mean["charts"][1]
-    assert mean["seam_length"][0] < 0.9 * mean["seam_length"][1]
+    assert mean["charts"][0] < 0.3 * mean["charts"][1]
+    assert mean["seam_length"][0] < 0.5 * mean["seam_length"][1]
 
 
 # The process that xatlas runs in --------------------------------------------------------------------------------------

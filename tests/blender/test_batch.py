@@ -306,6 +306,12 @@ def test_file_that_was_missing_and_came_is_a_change(batch, files, tmp_path):
     assert_done_anew(batch, [source], lambda: (tmp_path / "a.mtl").write_bytes(materials))
 
 
+def saved_in_place(path):
+    """Writes the scene by Blender alone, so that its relative paths lead from there."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    return path
+
+
 def test_linked_library_is_an_input(batch, files, tmp_path):
     bpy.data.materials.new("Linked").use_fake_user = True
     library = files("library.blend")
@@ -313,7 +319,7 @@ def test_linked_library_is_an_input(batch, files, tmp_path):
     with bpy.data.libraries.load(str(library), link=True, relative=False) as (_there, wanted):
         wanted.materials = ["Linked"]
     cube().data.materials.append(bpy.data.materials["Linked"])
-    source = files("a.blend")
+    source = saved_in_place(tmp_path / "a.blend")
 
     def change():
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -325,7 +331,7 @@ def test_linked_library_is_an_input(batch, files, tmp_path):
     assert "library.blend" in read_report(tmp_path / "r.json")["assets"][0]["resume"]["read"]
 
 
-def test_texture_is_an_input(batch, files, tmp_path):
+def test_texture_is_an_input(batch, tmp_path):
     """Some formats carry it, so it counts for all."""
     picture = tmp_path / "picture.png"
     image = bpy.data.images.new("Picture", 8, 8)
@@ -337,7 +343,7 @@ def test_texture_is_an_input(batch, files, tmp_path):
     node = material.node_tree.nodes.new("ShaderNodeTexImage")
     node.image = image
     cube().data.materials.append(material)
-    assert_done_anew(batch, [files("a.blend")], lambda: append(picture, b"more"))
+    assert_done_anew(batch, [saved_in_place(tmp_path / "a.blend")], lambda: append(picture, b"more"))
 
 
 def test_report_of_another_make_resumes_nothing(batch, files, tmp_path):
