@@ -27,10 +27,11 @@ def carried():
     files = importlib.metadata.distribution("ble_unwrap_native").files or ()
     found = [file for file in files if re.search(r"\.dist-info/licenses/THIRD_PARTY_LICENSES\.txt$", str(file))]
     assert len(found) == 1, "the wheel has no file of licences"
-    parts = re.split(r"(?m)^=+\n", found[0].read_text(encoding="utf-8"))
+    rule = "=" * 100 + "\n"
+    parts = re.split(rf"(?m)^{rule}Of (.*)\n{rule}", found[0].read_text(encoding="utf-8"))
     texts = {}
     for crates, text in zip(parts[1::2], parts[2::2], strict=True):
-        for crate in crates.removeprefix("Of ").strip().split(", "):
+        for crate in crates.split(", "):
             texts.setdefault(crate, []).append(text)
     return texts
 
@@ -50,7 +51,7 @@ def test_every_crate_of_the_wheel_is_covered(carried, script):
     assert len(licences) > 20, "cargo tree lists no dependencies"
     assert set(licences) <= set(carried)
     for crate, licence in licences.items():
-        assert all(len(text.split()) > 20 for text in carried[crate]), crate
+        assert all(text.strip() for text in carried[crate]), crate
         assert script["is_covered"](licence, carried[crate]), f"{crate} is under {licence}"
 
 
