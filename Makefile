@@ -14,7 +14,7 @@ VENV := .venv-py
 BIN := $(VENV)/bin
 WHEELS := addon/wheels
 # What the wheel is made of. Official Blender runs on glibc 2.28, which zig links against on any newer system.
-NATIVE := Cargo.toml Cargo.lock $(shell find native -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' 2>/dev/null)
+NATIVE := Cargo.toml Cargo.lock .ci/build_wheel .ci/third_party_licenses $(shell find native -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' 2>/dev/null)
 
 .PHONY: test test-rust test-python test-blender bench flamegraph scaling quality contact-sheet lint format venv wheel zip demo \
 	paper clean

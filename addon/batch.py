@@ -2,127 +2,30 @@
 
 `main(argv) -> exit code` never raises for what a user can cause. Codes: 0 all assets are fine; 1 some failed (the
 others are written, the report says why); 2 wrong usage; 3 Blender or the native library is missing; 4 all were
-written but a certificate does not hold.
+written but a certificate does not hold; 5 a signal stopped it (what was done is written and in the report).
 """
 
 # ruff: noqa: T201  (the command line talks through print)
 
-import argparse
-import hashlib
-import json
-import math
-import os
 import platform
 import sys
 import time
 import traceback
-from pathlib import Path
 
 import bpy
 
-from . import asset_io, comparison, engine, mesh_bridge, properties, targets
+from . import asset_io, batch_resume, comparison, engine, mesh_bridge, properties, targets
+from .batch_arguments import make_parser, settings_of
+from .batch_plan import PlanError, is_among, plan_outputs
+from .batch_report import ReportFile, earlier_assets
 from .cloud_task import CloudTask
 from .run import run_objects
+from .stop_signals import Stopped, StopRequest
 
-OK, SOME_FAILED, USAGE, ENVIRONMENT, VIOLATED = range(5)
-REPORT_SCHEMA = 1
-# No selection and no old place exist for a file.
-EXCLUDED_SETTINGS = ("use_selection",)
+OK, SOME_FAILED, USAGE, ENVIRONMENT, VIOLATED, INTERRUPTED = range(6)
+REPORT_SCHEMA = 2
 
 USER_ERRORS = (asset_io.AssetError, mesh_bridge.MeshError, engine.EngineError)
-
-
-def add_setting_arguments(parser):
-    """One option per declared setting, named and documented as it is in the panel."""
-    group = parser.add_argument_group("settings (as in the panel)")
-    for name, deferred in properties.annotations().items():
-        if name in EXCLUDED_SETTINGS:
-            continue
-        keywords = deferred.keywords
-        option = "--" + name.replace("_", "-")
-        text = keywords["description"].replace("%", "%%")
-        default = keywords["default"]
-        shown = _shown(default)
-        if name in properties.PAPER_VALUES:
-            shown += f"; {_shown(properties.PAPER_VALUES[name])} with --preset paper"
-        extra = {"dest": "setting_" + name, "default": None, "help": f"{text} (default: {shown})"}
-        if isinstance(default, bool):
-            group.add_argument(option, action=argparse.BooleanOptionalAction, **extra)
-        elif "items" in keywords:
-            choices = [item[0].lower() for item in keywords["items"]]
-            group.add_argument(option, choices=choices, type=str.lower, **extra)
-        elif name == "texture_size":
-            group.add_argument(option, type=int, nargs="+", metavar="PIXELS", **extra)
-        else:
-            group.add_argument(option, type=_ranged(type(default), keywords), metavar=name.upper(), **extra)
-
-
-def _shown(value):
-    """A setting's value as it is given on the command line."""
-    return " ".join(map(str, value)) if isinstance(value, tuple) else str(value).lower()
-
-
-def _ranged(kind, keywords):
-    def parse(text):
-        value = kind(text)
-        if kind is str:
-            return value
-        low, high = keywords.get("min", -float("inf")), keywords.get("max", float("inf"))
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"{text} is not between {low} and {high}")
-        return value
-
-    parse.__name__ = kind.__name__
-    return parse
-
-
-def settings_of(arguments, parser):
-    """The settings given on the command line, as the panel would hold them."""
-    result = {"preset": "DEFAULT", "use_selection": False}
-    for name, deferred in properties.annotations().items():
-        value = getattr(arguments, "setting_" + name, None)
-        if value is None:
-            continue
-        if "items" in deferred.keywords:
-            value = value.upper()
-        if name == "texture_size":
-            low, high = deferred.keywords["min"], deferred.keywords["max"]
-            if len(value) > 2 or not all(low <= pixels <= high for pixels in value):
-                parser.error(f"--texture-size: one or two numbers of pixels between {low} and {high}")
-            value = (value[0], value[-1])
-        result[name] = value
-    if 0 < result.get("landmark_max", 0) < 3:
-        parser.error("--landmark-max: 0 for no bound, or at least 3")
-    if not 0 <= getattr(arguments, "threads", 0) <= 1024:
-        parser.error("--threads: between 0 and 1024")
-    return result
-
-
-def make_parser():
-    parser = argparse.ArgumentParser(
-        prog="ble_unwrap",
-        description="Unwrap files of meshes, or of points without faces: "
-        + ", ".join("." + name for name in asset_io.INPUT_FORMATS)
-        + ".",
-        epilog="Meshes get a UV map, points an attribute of two floats; of the files .blend and .ply keep the latter. "
-        "Exit codes: 0 all fine, 1 some assets failed, 2 usage, 3 environment, 4 a certificate does not hold.",
-    )
-    parser.add_argument("inputs", nargs="+", metavar="IN", help="files to unwrap")
-    parser.add_argument("-o", "--output", required=True, metavar="OUT", help="directory, or a file for a single input")
-    parser.add_argument("--format", choices=asset_io.OUTPUT_FORMATS, help="output format (default: the input's)")
-    parser.add_argument("--report", metavar="FILE", help="write a JSON report")
-    parser.add_argument("--resume", action="store_true", help="skip what the report lists as done and is unchanged")
-    parser.add_argument(
-        "--atlas",
-        choices=("asset", "object"),
-        default="asset",
-        help="one atlas for all meshes of an asset, or one each; points always have one each (default: asset)",
-    )
-    parser.add_argument("--compare", action="store_true", help="also measure Smart UV Project at the same margin")
-    parser.add_argument("--threads", type=int, default=0, help="processor threads, 0 for all (default: 0)")
-    parser.add_argument("--quiet", action="store_true", help="print errors only")
-    add_setting_arguments(parser)
-    return parser
 
 
 def main(argv):
@@ -131,7 +34,8 @@ def main(argv):
     try:
         arguments = parser.parse_args(argv)
         settings = settings_of(arguments, parser)
-        outputs = plan_outputs(arguments, parser)
+        earlier = earlier_assets(arguments.report) if arguments.report else {}
+        plan, notes = planned_outputs(arguments, earlier, parser)
     except SystemExit as stop:
         return int(stop.code or 0)
     try:
@@ -139,86 +43,108 @@ def main(argv):
     except engine.EngineMissing as error:
         print(f"ble_unwrap: {error}", file=sys.stderr)
         return ENVIRONMENT
-    earlier = previous_assets(arguments.report, settings) if arguments.resume else {}
-    assets = []
-    for number, (source, target) in enumerate(outputs, 1):
-        label = f"[{number}/{len(outputs)}] {source}"
-        digest = file_digest(source)
-        done = earlier.get((str(source), str(target)))
-        if done and digest and done.get("sha256") == digest and target.exists():
-            asset = done
-            text = "done before"
-        else:
-            asset = process(source, target, settings, arguments)
-            asset["sha256"] = digest
-            text = asset["error"] or f"{asset['summary']} -> {target}"
-        assets.append(asset)
-        stream = sys.stdout if asset["status"] == "ok" else sys.stderr
-        if asset["status"] != "ok" or not arguments.quiet:
-            print(f"{label}: {text}", file=stream, flush=True)
-        for warning in asset.get("warnings", ()):
-            if not arguments.quiet:
-                print(f"    note: {warning}", flush=True)
-    code = exit_code(assets)
-    if arguments.report:
-        try:
-            write_json(arguments.report, make_report(assets, settings))
-        except OSError as error:
-            print(f"ble_unwrap: cannot write the report {arguments.report}: {error.strerror}", file=sys.stderr)
+    report = Report(arguments, settings, len(plan), earlier)
+    with StopRequest() as stop:
+        if not report.start():
             return SOME_FAILED
-    return code
+        show_notes(notes, arguments)
+        assets, stopped = process_all(plan, settings, arguments, earlier, report, stop)
+        written = report.finish("interrupted" if stopped else "complete", stopped_by=stopped)
+    if stopped:
+        again = "; run it again with --resume for the rest" if arguments.report else ""
+        print(f"ble_unwrap: stopped by {stopped}, {len(assets)} of {len(plan)} files were done{again}", file=sys.stderr)
+        return INTERRUPTED
+    return exit_code(assets) if written else SOME_FAILED
 
 
-def plan_outputs(arguments, parser):
-    """Pairs of input and output paths; wrong usage where a file would be lost."""
-    target = Path(arguments.output)
-    inputs = [Path(name) for name in arguments.inputs]
-    as_file = asset_io.file_format(target) in asset_io.OUTPUT_FORMATS and not target.is_dir()
-    if as_file and len(inputs) > 1:
-        parser.error("-o names a file, but there are several inputs: give a directory")
-    if target.suffix and not as_file and not target.is_dir() and len(inputs) == 1:
-        known = ", ".join(asset_io.OUTPUT_FORMATS)
-        parser.error(f"cannot write '{target.suffix}' files; known are {known} (a directory may have no such name)")
-    if as_file and arguments.format and arguments.format != asset_io.file_format(target):
-        parser.error(f"-o {target} and --format {arguments.format} contradict each other")
-    if not as_file and target.exists() and not target.is_dir():
-        parser.error(f"-o {target} is a file, not a directory")
-    pairs, taken = [], {}
-    for source in inputs:
-        kind = arguments.format or asset_io.default_output_format(source)
-        out = target if as_file else target / f"{source.stem}.{kind}"
-        if out.resolve() == source.resolve():
-            parser.error(f"{source} would be overwritten by its own result: give another -o")
-        if out.resolve() in taken:
-            parser.error(f"{source} and {taken[out.resolve()]} would both be written to {out}")
-        taken[out.resolve()] = source
-        pairs.append((source, out))
-    return pairs
+def planned_outputs(arguments, earlier, parser):
+    """What is read and written, and notes; ends with wrong usage where a file would be lost."""
+    try:
+        plan, notes = plan_outputs(
+            arguments.inputs,
+            arguments.output,
+            kind=arguments.format,
+            overwrite=arguments.overwrite,
+            written_before=set(earlier),
+        )
+    except PlanError as error:
+        parser.error(str(error))
+    if arguments.report and is_among(arguments.report, plan):
+        parser.error(f"--report {arguments.report} is an input or an output: give another name")
+    return plan, notes
 
 
-def process(source, target, settings, arguments):
-    """Unwraps one file; what goes wrong is in the result, not raised."""
+def options_of(arguments):
+    """The options besides the settings that change results."""
+    return {"atlas": arguments.atlas, "compare": arguments.compare}
+
+
+def show_notes(notes, arguments, indent=""):
+    if not arguments.quiet:
+        for note in notes:
+            print(f"{indent}note: {note}", flush=True)
+
+
+def process_all(plan, settings, arguments, earlier, report, stop):
+    """Unwraps one file after the other and reports each: their entries, and the name of the signal that stopped it."""
+    evidence = batch_resume.Evidence(settings, options_of(arguments))
+    assets = []
+    try:
+        for number, planned in enumerate(plan, 1):
+            stop.check()
+            before = earlier.get((str(planned.source), str(planned.target)))
+            if arguments.resume and before and not planned.problem and evidence.is_done(planned, before):
+                asset, text = before, "done before"
+            else:
+                asset = process(planned, settings, arguments, evidence, stop)
+                text = asset["error"] or f"{asset['summary']} -> {planned.target}"
+            assets.append(asset)
+            report.add(asset)
+            stream = sys.stdout if asset["status"] == "ok" else sys.stderr
+            if asset["status"] != "ok" or not arguments.quiet:
+                print(f"[{number}/{len(plan)}] {planned.source}: {text}", file=stream, flush=True)
+            show_notes(asset.get("warnings", ()), arguments, indent="    ")
+    except Stopped as signal:
+        return assets, str(signal)
+    return assets, None
+
+
+def process(planned, settings, arguments, evidence, stop):
+    """Unwraps one file; what goes wrong is in the result. Raises `Stopped` alone, with the output as it was."""
+    source, target = planned.source, planned.target
     asset = {"in": str(source), "out": None, "status": "failed", "error": None, "summary": "", "objects": []}
     started = time.perf_counter()
+    asset["sha256"] = digest = evidence.digest(source)
     try:
+        if planned.problem:
+            raise asset_io.AssetError(planned.problem)
         # These formats split vertices wherever normals or UVs differ.
         settings = {"weld": asset_io.file_format(source) in asset_io.SPLIT_FORMATS, **settings}
         asset_io.load(source)
+        external = batch_resume.external_files()
         contents = asset_io.prepare(target)
         objects, notes = unwrapped_objects(targets.unique_data(contents.objects), target)
-        run, outcomes = run_objects(objects, settings, threads=arguments.threads, one_atlas=arguments.atlas == "asset")
+        run, outcomes = run_objects(
+            objects,
+            settings,
+            threads=arguments.threads,
+            one_atlas=arguments.atlas == "asset",
+            progress=lambda _fraction, _stage: stop.check(),
+        )
         asset["objects"] = [describe(task, outcome) for task, outcome in zip(run.tasks, outcomes, strict=True)]
         warnings = [text for outcome in outcomes for text in outcome.certificate.warnings]
-        asset["warnings"] = contents.notes + notes + warnings
+        asset["warnings"] = planned.notes + contents.notes + notes + warnings
         asset["summary"] = "; ".join(outcome.summary for outcome in outcomes)
         if arguments.compare:
             add_baseline(asset, run, settings)
+        stop.check()
         saved = asset_io.save(target, source=source, cloud=written_cloud(run, outcomes), contents=contents)
         asset["out"] = str(target)
         asset["warnings"] = [text for text in asset["warnings"] if text not in saved.bare] + saved.notes
         broken = [text for outcome in outcomes for text in outcome.certificate.violations] + saved.bare
         asset["status"] = "violated" if broken else "ok"
         asset["error"] = "; ".join(broken) or None
+        asset["resume"] = evidence.note(planned, digest, external)
     except USER_ERRORS as error:
         asset["error"] = str(error)
     except Exception as error:  # a bug of ours: the other assets go on, and this one is reported as it is
@@ -294,26 +220,40 @@ def exit_code(assets):
     return VIOLATED if "violated" in statuses else OK
 
 
-def file_digest(path):
-    try:
-        with Path(path).open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError:
-        return None
+class Report:
+    """The report of a run, where one is asked for; that it cannot be written is said and ends nothing."""
 
+    def __init__(self, arguments, settings, planned, earlier):
+        head = {
+            "schema": REPORT_SCHEMA,
+            "tool": {"name": "ble_unwrap", "native": engine.version()},
+            "blender": bpy.app.version_string,
+            "python": platform.python_version(),
+            "params": settings,
+            "options": options_of(arguments),
+            "planned": planned,
+        }
+        self._file = ReportFile(arguments.report, head, earlier) if arguments.report else None
 
-def make_report(assets, settings):
-    counts = {name: sum(asset["status"] == name for asset in assets) for name in ("ok", "violated", "failed")}
-    return {
-        "schema": REPORT_SCHEMA,
-        "tool": {"name": "ble_unwrap", "native": engine.version()},
-        "blender": bpy.app.version_string,
-        "python": platform.python_version(),
-        "params": settings,
-        "assets": assets,
-        "summary": {"assets": len(assets), **counts},
-        "peak_rss_mb": peak_memory_mb(),
-    }
+    def start(self):
+        """Whether a report can be written: asked before any work."""
+        return self._try(lambda file: file.start())
+
+    def add(self, asset):
+        return self._try(lambda file: file.add(asset))
+
+    def finish(self, state, **more):
+        """Writes it for good; whether that went well."""
+        return self._try(lambda file: file.finish(state, **more, peak_rss_mb=peak_memory_mb()))
+
+    def _try(self, write):
+        try:
+            if self._file:
+                write(self._file)
+            return True
+        except OSError as error:
+            print(f"ble_unwrap: cannot write the report {self._file.path}: {error.strerror}", file=sys.stderr)
+            return False
 
 
 def peak_memory_mb():
@@ -323,39 +263,3 @@ def peak_memory_mb():
         return None
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return round(peak / (1024 * 1024 if sys.platform == "darwin" else 1024), 1)
-
-
-def write_json(path, value):
-    """Writes JSON under a temporary name, then renames: a reader never sees half a file."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    work = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        work.write_text(json.dumps(_plain(value), indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        work.replace(path)
-    finally:
-        work.unlink(missing_ok=True)
-
-
-def _plain(value):
-    """A value as JSON can hold it: NumPy's scalars and arrays as numbers, what is not finite as null."""
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if hasattr(value, "tolist"):
-        return _plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
-def previous_assets(report, settings):
-    """Finished assets of an earlier report made with the same settings, by input and output."""
-    try:
-        earlier = json.loads(Path(report).read_text(encoding="utf-8"))
-        if earlier["schema"] != REPORT_SCHEMA or earlier["params"] != json.loads(json.dumps(settings)):
-            return {}
-        return {(asset["in"], asset["out"]): asset for asset in earlier["assets"] if asset["status"] == "ok"}
-    except (OSError, TypeError, ValueError, KeyError):
-        return {}

@@ -1,21 +1,25 @@
-"""BLE Unwrap against Smart UV Project on your own meshes, at the same margin.
+"""BLE Unwrap against Smart UV Project, and xatlas where it is installed, on your own meshes, at the same margin.
 
 blender -b -P blender_scripts/compare.py -- IN... -o OUTDIR [--margin 4] [--texture-size 2048] [settings]
 python blender_scripts/compare.py IN... -o OUTDIR [settings]
 
-Writes OUTDIR/compare.json, a picture of both layouts a model, coloured by stretch, and a .blend with both UV maps
-(`--no-blend` leaves it out). Exit codes as for unwrap.py.
+Writes OUTDIR/compare.json, a picture of the first two layouts a model, coloured by stretch, and a .blend with their UV
+maps (`--no-blend` leaves it out). xatlas knows triangles only and may cut between two of one polygon, so its layout is
+measured on the triangles and is no UV map. Exit codes as for unwrap.py.
 """
 
 import argparse
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import addon_loader
+import numpy as np
 import pictures
 import tables
+import xatlas_peer
 
 
 def compare_objects(objects, name, out, settings, *, threads=0, picture_size=900, progress=None):
@@ -35,19 +39,53 @@ def compare_objects(objects, name, out, settings, *, threads=0, picture_size=900
     return rows
 
 
+def xatlas_row(objects, settings):
+    """The measurement of a layout by xatlas of the same objects. Raises `xatlas_peer.Unavailable`."""
+    engine, bridge = addon_loader.load("engine"), addon_loader.load("mesh_bridge")
+    properties = addon_loader.load("properties")
+    full = {**properties.default_values(settings.get("preset", "DEFAULT")), **settings}
+    selection = bridge.gather(bridge.unique_meshes(objects))
+    corners = selection.corner_vertices
+    if selection.corner_triangles is not None:
+        corners = corners[selection.corner_triangles]
+    triangles = SimpleNamespace(
+        positions=selection.positions,
+        corner_vertices=np.ascontiguousarray(corners.reshape(-1)),
+        face_offsets=np.arange(0, corners.size + 1, 3, dtype=np.int32),
+        corner_triangles=None,
+    )
+    peer = xatlas_peer.unwrap(
+        triangles.positions,
+        triangles.corner_vertices,
+        margin=full["margin"],
+        texture_size=full["texture_size"],
+    )
+    # Its texture has a size of its own, by which its UVs are divided: stretch and margin are in the texels of that.
+    measured = engine.measure(triangles, peer.uv, texture_size=peer.texture_size, margin=full["margin"])
+    return {**measured, "seconds_total": peer.seconds, "texture_size": peer.texture_size}
+
+
+def with_xatlas(rows, objects, settings):
+    """The rows and one by xatlas after them, and None; or the same rows and why there is none."""
+    try:
+        return {**rows, "xatlas": xatlas_row(objects, settings)}, None
+    except xatlas_peer.Unavailable as error:
+        return rows, f"no row by xatlas: {error}"
+
+
 def main(argv):
     batch, asset_io = addon_loader.load("batch"), addon_loader.load("asset_io")
     engine, bridge = addon_loader.load("engine"), addon_loader.load("mesh_bridge")
-    targets = addon_loader.load("targets")
-    parser = argparse.ArgumentParser(prog="compare.py", description="BLE Unwrap against Smart UV Project.")
+    targets, arguments = addon_loader.load("targets"), addon_loader.load("batch_arguments")
+    parser = argparse.ArgumentParser(prog="compare.py", description="BLE Unwrap against Smart UV Project and xatlas.")
     parser.add_argument("inputs", nargs="+", metavar="IN")
     parser.add_argument("-o", "--output", required=True, metavar="OUTDIR")
     parser.add_argument("--picture-size", type=int, default=900, help="pixels of one layout (default: 900)")
     parser.add_argument("--blend", action=argparse.BooleanOptionalAction, default=True, help="also write a .blend")
     parser.add_argument("--threads", type=int, default=0)
-    batch.add_setting_arguments(parser)
+    arguments.add_setting_arguments(parser)
     options = parser.parse_args(argv)
-    settings = batch.settings_of(options, parser)
+    settings = arguments.settings_of(options, parser)
     if not 64 <= options.picture_size <= 8192:
         parser.error("--picture-size must be between 64 and 8192")
     out = Path(options.output)
@@ -60,7 +98,7 @@ def main(argv):
     except OSError as error:
         print(f"compare.py: cannot write to {out}: {error.strerror}", file=sys.stderr)
         return batch.SOME_FAILED
-    models, failed = {}, {}
+    models, failed, left_out = {}, {}, {}
     for number, name in enumerate(options.inputs, 1):
         print(f"[{number}/{len(options.inputs)}] {name}", flush=True)
         source = Path(name)
@@ -72,6 +110,10 @@ def main(argv):
             models[key] = compare_objects(
                 objects, key, out, settings, threads=options.threads, picture_size=options.picture_size
             )
+            models[key], reason = with_xatlas(models[key], objects, settings)
+            if reason:
+                left_out[key] = reason
+                print(f"{name}: {reason}", flush=True)
             if options.blend:
                 asset_io.save(out / f"{key}.blend")
         except (*batch.USER_ERRORS, OSError) as error:
@@ -79,7 +121,8 @@ def main(argv):
             print(f"{name}: {error}", file=sys.stderr, flush=True)
     if models:
         print("", *tables.table(models), "", sep="\n")
-    batch.write_json(out / "compare.json", {"params": settings, "models": models, "failed": failed})
+    report = {"params": settings, "models": models, "left_out": left_out, "failed": failed}
+    addon_loader.load("batch_report").write_json(out / "compare.json", report)
     print(f"written to {out}/")
     if failed:
         return batch.SOME_FAILED

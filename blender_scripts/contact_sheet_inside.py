@@ -183,7 +183,9 @@ def main(argv):
     height = max(cell.shape[0] for cell in cells)
     cells = [np.concatenate([cell, _plain(height - cell.shape[0], cell.shape[1])]) for cell in cells]
     pictures.write_png(options.output, sheet(cells, options.columns))
-    batch.write_json(options.output.with_suffix(".json"), {"models": report, "failed": failed})
+    addon_loader.load("batch_report").write_json(
+        options.output.with_suffix(".json"), {"models": report, "failed": failed}
+    )
     print(f"written to {options.output}")
     if failed:
         return batch.SOME_FAILED

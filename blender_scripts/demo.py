@@ -3,7 +3,8 @@
 python blender_scripts/demo.py [MESH] [-o out] [--zip FILE] [--no-render]
 
 Finds a Blender ($BLENDER, else `blender` 4.2 or later on PATH, else PyPI's bpy, which is downloaded once), installs the
-extension into a throw-away profile as a user would, and runs demo_inside.py there.
+extension into a throw-away profile as a user would, and runs demo_inside.py there, with xatlas at hand to compare with
+where it can be had.
 """
 
 import argparse
@@ -31,7 +32,7 @@ def main():
         arguments += ["--mesh", Path(options.mesh).resolve()]
     if not options.render:
         arguments.append("--no-render")
-    return launch.run_with_extension("demo_inside.py", arguments, options.zip)
+    return launch.run_with_extension("demo_inside.py", arguments, options.zip, peers=True)
 
 
 if __name__ == "__main__":

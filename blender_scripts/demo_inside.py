@@ -53,6 +53,9 @@ def demonstrate_mesh(objects, name, out, options):
     rows = compare.compare_objects(objects, name, out, {}, progress=show_progress)
     end_progress()
     print(f"{name}: {engine.summary(rows['ble_unwrap'], rows['ble_unwrap']['seconds_total'])}", flush=True)
+    rows, reason = compare.with_xatlas(rows, objects, {})
+    if reason:
+        print(f"{name}: {reason}", flush=True)
     if options.render:
         print(f"{name}: rendering", flush=True)
         render_both(objects, out, name)
@@ -150,7 +153,7 @@ def main(argv):
         "clouds": clouds,
         "failed": failed,
     }
-    batch.write_json(out / "report.json", report)
+    addon_loader.load("batch_report").write_json(out / "report.json", report)
     for name in [*models, *clouds]:
         files = [f"{name}.blend"] + [f"{name}_layout.png"] * (name in models) + [f"{name}_render.png"] * options.render
         print("  " + "  ".join(str(out / file) for file in files))

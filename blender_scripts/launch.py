@@ -168,10 +168,31 @@ def find_archive(given=None):
     return archives[-1]
 
 
-def run_with_extension(script, arguments, archive=None):
+def xatlas_library(blender):
+    """A directory with xatlas for the Python of a Blender, made on first use; None where it cannot be: why is printed.
+
+    It is kept apart from the Blender and its packages.
+    """
+    if not isinstance(blender, BpyModule):
+        say("xatlas is left out of the comparison: it is installed for PyPI's bpy only")
+        return None
+    target = CACHE / f"xatlas-{blender.key}"
+    if not any(target.glob("xatlas*")):
+        requirements = (REPO / ".ci" / "requirements.txt").read_text(encoding="utf-8")
+        wanted = re.search(r"(?m)^xatlas.*$", requirements)[0]
+        install = [blender.python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps"]
+        done = subprocess.run([*install, "--only-binary", ":all:", "--target", target, wanted], check=False)
+        if done.returncode:
+            say("xatlas is left out of the comparison: it could not be installed")
+            return None
+    return target
+
+
+def run_with_extension(script, arguments, archive=None, *, peers=False):
     """Runs one of the scripts in a throw-away Blender that the extension is installed in; its exit code.
 
-    Where there is no Blender or no extension to be had, `ENVIRONMENT`; why is printed.
+    With `peers`, the script finds xatlas where it can be had. Where there is no Blender or no extension to be had,
+    `ENVIRONMENT`; why is printed.
     """
     try:
         archive = find_archive(archive)
@@ -180,7 +201,9 @@ def run_with_extension(script, arguments, archive=None):
         with Profile(blender) as profile:
             say(f"Installing {archive.name} into a throw-away profile of {blender.name}")
             profile.install(archive)
-            return profile.run(SCRIPTS / script, *arguments).returncode
+            library = xatlas_library(blender) if peers else None
+            environment = {"BLE_XATLAS_LIBRARY": str(library)} if library else {}
+            return profile.run(SCRIPTS / script, *arguments, environment=environment).returncode
     except Unavailable as error:
         print(f"{Path(sys.argv[0]).stem}: {error}", file=sys.stderr)
         return ENVIRONMENT

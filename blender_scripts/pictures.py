@@ -136,8 +136,8 @@ def point_layout(uv, colours, size=900):
 
 
 def legend(width, height=22):
-    """The scale of stretch colours as a strip."""
-    strip = np.empty((height, width, 3), np.uint8)
+    """The scale of stretch colours as a strip; of a narrow one the right end is cut off."""
+    strip = np.empty((height, max(width, 310), 3), np.uint8)
     strip[:] = BACKGROUND
     values = np.linspace(1.0, 2.0, 200)
     strip[4 : height - 4, 110:310] = _ramp(values)
@@ -147,7 +147,7 @@ def legend(width, height=22):
     end = draw_text(strip, "FLIPPED", end + 58, 5, 2)
     strip[4 : height - 4, end + 30 : end + 50] = OVERLAP
     draw_text(strip, "OVERLAP", end + 58, 5, 2)
-    return strip
+    return strip[:, :width]
 
 
 def corner_triangles(selection):

@@ -11,7 +11,12 @@ COLUMNS = (
     ("used", "packing_efficiency", "{:.1%}"),
     ("seconds", "seconds_total", "{:.2f}"),
 )
-LABELS = {"ble_unwrap": "BLE Unwrap", "smart_uv_best": "Smart UV, best", "smart_uv_default": "Smart UV"}
+LABELS = {
+    "ble_unwrap": "BLE Unwrap",
+    "smart_uv_best": "Smart UV, best",
+    "smart_uv_default": "Smart UV",
+    "xatlas": "xatlas",
+}
 
 
 def label(name, row):

@@ -305,6 +305,11 @@ NEVER = {
         for name in ("formats", "gltf_file", "input_check", "ply_header", "read_back", "zstd_frames")
     },
     "modifiers.py": {".engine", "ble_unwrap_native"},
+    "input_file.py": {"bpy", "bmesh", "numpy", ".engine", ".asset_io", "ble_unwrap_native"},
+    "batch_report.py": {"bpy", "bmesh", ".engine", ".asset_io", ".batch", "ble_unwrap_native"},
+    "stop_signals.py": {"bpy", "bmesh", ".engine", ".batch", "ble_unwrap_native"},
+    "batch_plan.py": {"bpy", "bmesh", ".engine", ".batch", ".batch_report", "ble_unwrap_native"},
+    "batch_resume.py": {"bmesh", ".batch", ".batch_report", "ble_unwrap_native"},
     "targets.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
     "cloud_report.py": {"bpy", "bmesh", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
     "operators": {"ble_unwrap_native"},

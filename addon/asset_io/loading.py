@@ -4,7 +4,7 @@ from pathlib import Path
 
 import bpy
 
-from .. import cloud_bridge, point_file, targets
+from .. import cloud_bridge, input_file, point_file, targets
 from . import input_check
 from .formats import INPUT_FORMATS, AssetError, file_format, reason
 from .scene import bone_shapes
@@ -42,6 +42,8 @@ def load(path):
     kind = file_format(path)
     if kind not in INPUT_FORMATS:
         raise AssetError(f"cannot read '.{kind}' files; known are {', '.join(INPUT_FORMATS)}")
+    if problem := input_file.why_unreadable(path):
+        raise AssetError(problem)
     input_check.check(path)
     try:
         if kind == "blend":

@@ -1,5 +1,6 @@
 """The headless scripts: formats, reports, every exit code, nothing lost."""
 
+import importlib.util
 import json
 import os
 import struct
@@ -172,7 +173,6 @@ def test_output_that_cannot_be_a_directory_is_1(run_script, files, tmp_path):
         (("a.obj", "-o", "out", "--texture-size", "1", "2", "3"), "one or two numbers"),
         (("a.obj", "-o", "out", "--preset", "fast"), "invalid choice"),
         (("a.obj", "-o", "."), "overwritten by its own result"),
-        (("a.obj", "sub/a.obj", "-o", "out"), "would both be written"),
         (("a.obj", "b.obj", "-o", "one.obj"), "several inputs"),
         (("a.obj", "-o", "out.xyz"), "cannot write"),
     ],
@@ -212,7 +212,7 @@ def test_help_lists_every_setting(run_script, addon):
     done = run_script("unwrap.py", "--help")
     assert done.returncode == 0
     for name in addon("properties").annotations():
-        if name not in addon("batch").EXCLUDED_SETTINGS:
+        if name not in addon("batch_arguments").EXCLUDED_SETTINGS:
             assert "--" + name.replace("_", "-") in done.stdout
 
 
@@ -269,12 +269,60 @@ def test_compare_script(run_script, files, tmp_path):
     done = run_script("compare.py", source, "-o", "out", "--picture-size", "256")
     assert done.returncode == 0, done.stdout
     rows = json.loads((tmp_path / "out/compare.json").read_text())["models"]["ball"]
-    assert set(rows) == {"ble_unwrap", "smart_uv_best", "smart_uv_default"}
+    assert set(rows) - {"xatlas"} == {"ble_unwrap", "smart_uv_best", "smart_uv_default"}
+    assert ("xatlas" in rows) is ("no row by xatlas: xatlas is not installed" not in done.stdout)
     assert "BLE Unwrap" in done.stdout and "Smart UV" in done.stdout
     rows_of, (height, width) = read_png(tmp_path / "out/ball_layout.png")
     assert width > 512 and height > 256
     assert len(np.unique(rows_of[:, 1:].reshape(-1, 3), axis=0)) > 3
     assert (tmp_path / "out/ball.blend").is_file()
+
+
+XATLAS = """
+import numpy as np
+
+class ChartOptions: pass
+class PackOptions: pass
+
+class Atlas:
+    # Every triangle a chart of its own, in a row of a texture four times as wide as high.
+    atlas_count, width, height, utilization = 1, 400, 100, 0.5
+
+    def add_mesh(self, positions, triangles):
+        assert positions.dtype == np.float32 and triangles.dtype == np.uint32
+        self.chart_count = len(triangles)
+
+    def generate(self, charts, packing):
+        assert packing.padding == 2 and packing.resolution == 2048
+
+    def __getitem__(self, _number):
+        left = np.arange(self.chart_count)[:, None] / self.chart_count
+        x = left + np.array([0.1, 0.9, 0.1]) / self.chart_count
+        uv = np.stack([x, np.broadcast_to([0.1, 0.1, 0.9], x.shape)], axis=-1).reshape(-1, 2).astype(np.float32)
+        return None, np.arange(len(uv), dtype=np.uint32).reshape(-1, 3), uv
+"""
+
+
+@pytest.mark.skipif(importlib.util.find_spec("xatlas") is not None, reason="the one that is installed goes first")
+def test_compare_script_with_xatlas(run_script, files, tmp_path):
+    """The row is in the table and the report, measured on the triangles of the same objects."""
+    cube()
+    source = files("box.blend")
+    (tmp_path / "library").mkdir()
+    (tmp_path / "library/xatlas.py").write_text(XATLAS)
+    arguments = ["compare.py", source, "-o", "out", "--picture-size", "128", "--no-blend"]
+    done = run_script(*arguments, environment={"BLE_XATLAS_LIBRARY": str(tmp_path / "library")})
+    assert done.returncode == 0, done.stdout
+    report = json.loads((tmp_path / "out/compare.json").read_text())
+    row = report["models"]["box"]["xatlas"]
+    assert (row["charts"], row["faces"], row["texture_size"]) == (12, 12, [400, 100])
+    assert row["overlaps"] == row["flips"] == 0 and report["left_out"] == {}
+    assert any(line.split()[:2] == ["xatlas", "12"] for line in done.stdout.splitlines())
+    (tmp_path / "library/xatlas.py").write_text("raise RuntimeError('broken')")
+    done = run_script(*arguments, environment={"BLE_XATLAS_LIBRARY": str(tmp_path / "library")})
+    assert done.returncode == 0 and "no row by xatlas: xatlas failed: RuntimeError: broken" in done.stdout
+    report = json.loads((tmp_path / "out/compare.json").read_text())
+    assert "xatlas" not in report["models"]["box"] and "broken" in report["left_out"]["box"]
 
 
 def test_compare_script_names_what_failed(run_script, tmp_path):
