@@ -27,6 +27,7 @@ pub mod embedding;
 mod error;
 pub mod geodesics;
 pub mod linalg;
+pub mod memory;
 pub mod mesh;
 pub mod metrics;
 pub mod packing;

@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use ble_unwrap_core::{Progress, Stage};
 use pyo3::prelude::*;
 
+use crate::allocator;
 use crate::errors::{Failure, InvalidArgumentError};
 
 /// Turns the output of a computation into a Python object, once, with the interpreter held.
@@ -109,6 +110,8 @@ impl Job {
         }
         let shared = Arc::clone(&self.shared);
         let run = move || {
+            allocator::hold_reserve();
+            shared.progress.begin();
             let outcome = catch_unwind(AssertUnwindSafe(|| {
                 shared.progress.check().map_err(Failure::from)?;
                 with_threads(threads, || work(&shared.progress))

@@ -2,7 +2,7 @@
 
 use ble_unwrap_core::standalone::repack;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyType};
 
 use crate::arrays::{self, Argument};
 use crate::errors::Failure;
@@ -23,6 +23,21 @@ use crate::settings::{self, Function};
 pub(crate) struct PackedCharts {
     uv: Py<Array>,
     report: Py<PyDict>,
+}
+
+#[pymethods]
+impl PackedCharts {
+    #[new]
+    #[pyo3(signature = (uv, report, /))]
+    fn new(uv: Py<Array>, report: Py<PyDict>) -> Self {
+        Self { uv, report }
+    }
+
+    /// For `pickle` and `copy`.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (Py<Array>, Py<PyDict>)) {
+        let (py, of) = (slf.py(), slf.get());
+        (slf.get_type(), (of.uv.clone_ref(py), of.report.clone_ref(py)))
+    }
 }
 
 /// Move, turn and scale charts so that they fill the unit square and keep their margin.

@@ -71,6 +71,12 @@ pub(super) fn finish(
             report.faces = input.face_offsets.len().saturating_sub(1);
             report.unmapped_faces = surface.unmapped.len();
             report.warnings = warnings(surface, &layout, &certificate);
+            if measures.faces > measures.unmapped_faces && measures.l2.is_nan() {
+                report.warnings.push(
+                    "the stretch could not be measured: every triangle is thinner than single precision tells from none"
+                        .into(),
+                );
+            }
             if let Some(&(chart, l2)) = report.charts_over_limit.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
                 report.warnings.push(format!(
                     "{} charts exceed the stretch limit, the worst is chart {chart} with {l2:.3}",
