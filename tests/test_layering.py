@@ -15,15 +15,16 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "native/ble_unwrap_core/src"
 
-FOUNDATION = {"progress", "linalg", "mesh"}
+FOUNDATION = {"memory", "progress", "linalg", "mesh"}
 TOOLS = FOUNDATION | {"geodesics", "distortion"}
 # In the order of the pipeline. A stage sees the types that earlier stages put out, never their functions.
 STAGES = ["segmentation", "charts", "embedding", "stretch", "packing"]
 # Module of the core -> modules all of whose public items it may use.
 MAY_USE = {
-    "progress": set(),
-    "linalg": {"progress"},
-    "mesh": {"progress"},
+    "memory": set(),
+    "progress": {"memory"},
+    "linalg": {"memory", "progress"},
+    "mesh": {"memory", "progress"},
     "geodesics": FOUNDATION,
     "distortion": FOUNDATION,
     **dict.fromkeys(STAGES, TOOLS),

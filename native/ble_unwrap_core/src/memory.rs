@@ -104,11 +104,8 @@ pub fn available() -> Option<u64> {
     let machine = read("/proc/meminfo").and_then(|text| {
         Some(kibibytes(&text, "MemAvailable:")?.saturating_add(kibibytes(&text, "SwapFree:").unwrap_or(0)))
     });
-    let all = [
-        left(limit("Max address space"), taken("VmSize:")),
-        left(limit("Max data size"), taken("VmData:")),
-        machine,
-    ];
+    let all =
+        [left(limit("Max address space"), taken("VmSize:")), left(limit("Max data size"), taken("VmData:")), machine];
     all.into_iter().flatten().min()
 }
 
@@ -142,7 +139,11 @@ pub(crate) fn refusals() -> u64 {
 
 /// Fails if a refusal was noted since there were so many.
 pub(crate) fn none_since(count: u64) -> Result<(), OutOfMemory> {
-    if refusals() == count { Ok(()) } else { Err(OutOfMemory::Refused { bytes: REFUSED_BYTES.load(Ordering::Relaxed) }) }
+    if refusals() == count {
+        Ok(())
+    } else {
+        Err(OutOfMemory::Refused { bytes: REFUSED_BYTES.load(Ordering::Relaxed) })
+    }
 }
 
 #[cfg(test)]

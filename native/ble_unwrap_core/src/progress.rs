@@ -14,7 +14,7 @@ pub enum Cancelled {
     OnRequest,
     /// There was no memory to go on with.
     #[error(transparent)]
-    OutOfMemory(#[from] OutOfMemory),
+    OutOfMemory(OutOfMemory),
 }
 
 /// What the pipeline is doing, in order.
@@ -121,7 +121,7 @@ impl Progress {
         if self.is_cancelled() {
             return Err(Cancelled::OnRequest);
         }
-        Ok(memory::none_since(self.refusals.load(Ordering::Relaxed))?)
+        memory::none_since(self.refusals.load(Ordering::Relaxed)).map_err(Cancelled::OutOfMemory)
     }
 
     /// The current stage.

@@ -24,7 +24,7 @@ use crate::unwrap::MeshArrays;
 ///     Negative for faces without UVs. Charts themselves are found from the UVs.
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
-/// texture_size : int or (int, int)
+/// texture_size : int or two ints
 ///     Width and height of the texture in texels.
 /// margin : float
 ///     Distance of charts, in texels, at least up to half of which gaps are searched for.

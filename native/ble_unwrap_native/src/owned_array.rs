@@ -127,7 +127,11 @@ impl Array {
             "f" => Elements::F32(read(bytes, f32::from_le_bytes)),
             "d" => Elements::F64(read(bytes, f64::from_le_bytes)),
             "i" => Elements::I32(read(bytes, i32::from_le_bytes)),
-            _ => return Err(InvalidArgumentError::new_err(format!("format: expected 'f', 'd' or 'i'; found {format:?}"))),
+            _ => {
+                return Err(InvalidArgumentError::new_err(format!(
+                    "format: expected 'f', 'd' or 'i'; found {format:?}"
+                )));
+            }
         };
         let count = shape.iter().try_fold(elements.item_size(), |bytes, &length| bytes.checked_mul(length));
         if !(1..=2).contains(&shape.len()) || count != Some(bytes.len()) {
@@ -140,7 +144,9 @@ impl Array {
     }
 
     /// For `pickle` and `copy`.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyType>, (Bound<'py, PyBytes>, String, Bound<'py, PyTuple>))> {
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyType>, (Bound<'py, PyBytes>, String, Bound<'py, PyTuple>))> {
         let (py, array) = (slf.py(), slf.get());
         let bytes: Vec<u8> = match &array.elements {
             Elements::F32(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),

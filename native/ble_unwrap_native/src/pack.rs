@@ -54,7 +54,7 @@ impl PackedCharts {
 ///     A new ``Job``, by which another thread watches or cancels this call.
 /// margin : float
 ///     Least distance between charts, in texels; half of it is kept to the border.
-/// texture_size : int or (int, int)
+/// texture_size : int or two ints
 ///     Width and height of the texture in texels. Charts keep their shape in texels.
 /// rotation : {"any", "quarter", "none"}
 ///     How charts may be turned. They are never mirrored.

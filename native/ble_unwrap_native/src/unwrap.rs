@@ -183,7 +183,7 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 ///     Most iterations of that.
 /// margin : float
 ///     Least distance between charts, in texels of ``texture_size``.
-/// texture_size : int or (int, int)
+/// texture_size : int or two ints
 ///     Width and height of the texture in texels. UVs of a texture that is not square are stretched to the unit square.
 /// rotation : {"any", "quarter", "none"}
 ///     How charts may be turned in packing.
@@ -207,6 +207,8 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 ///     are checked first.
 /// InvalidMeshError
 ///     If indices or offsets do not make a mesh. The text names the first wrong element.
+/// OutOfMemoryError
+///     If there is not enough memory. The result never depends on how much there is.
 /// InternalError
 ///     If the library is at fault.
 ///

@@ -64,7 +64,7 @@ pub(super) fn relax(
 fn solver(pattern: SparsePattern) -> Result<Option<SparseCholesky>, Cancelled> {
     match SparseCholesky::analyse(pattern) {
         Ok(system) => Ok(Some(system)),
-        Err(SparseError::OutOfMemory(error)) => Err(error.into()),
+        Err(SparseError::OutOfMemory(error)) => Err(Cancelled::OutOfMemory(error)),
         Err(_) => Ok(None),
     }
 }

@@ -106,15 +106,18 @@ impl<'a> Source<'a> {
     }
 
     /// The squared distances, or affinities, among landmarks: a symmetric k×k matrix.
-    pub(super) fn among(&self, landmarks: &[usize], reference: &Reference) -> Vec<f64> {
+    ///
+    /// # Errors
+    /// [`EmbeddingError::TooManyPoints`].
+    pub(super) fn among(&self, landmarks: &[usize], reference: &Reference) -> Result<Vec<f64>, EmbeddingError> {
         let k = landmarks.len();
-        let mut matrix = vec![0.0; k * k];
+        let mut matrix = square_matrix(k)?;
         matrix.par_chunks_mut(k.max(1)).zip(landmarks).enumerate().for_each(|(l, (row, &i))| {
             self.observe(reference, i, row);
             row[l] = 0.0;
         });
         symmetrise(&mut matrix, k);
-        matrix
+        Ok(matrix)
     }
 
     /// At most `count` points in farthest-point order: each as far from all before it as any point, ties to the lower

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::krylov::{LANES, block_width, leading_of_operator, pays};
 use super::symmetric::{EigenError, Eigenpairs, leading_eigenpairs};
 use crate::Progress;
+use crate::memory;
 
 /// A coordinate is kept only where its eigenvalue exceeds this share of the largest: below it
 /// the double-centred matrix is rounding noise, and placement divides by the eigenvalue's root.
@@ -113,7 +114,7 @@ pub fn classical_mds(squared: &[f64], k: usize, keep: usize) -> Result<Mds, Eige
     }
     let mean: Vec<f64> = squared.chunks_exact(k).map(|row| row.iter().sum::<f64>() / k as f64).collect();
     let grand = mean.iter().sum::<f64>() / k as f64;
-    let mut b = vec![0.0; k * k];
+    let mut b = memory::filled(k * k, 0.0)?;
     for i in 0..k {
         for j in 0..k {
             b[i * k + j] = -0.5 * (squared[i * k + j] - mean[i] - mean[j] + grand);

@@ -116,7 +116,8 @@ mod tests {
         if std::env::var_os(ASKED).is_none() {
             let name = "linalg::packing_buffers::tests::the_kernels_take_no_more_than_is_said";
             let own = std::env::current_exe().expect("this test");
-            let run = std::process::Command::new(own).args([name, "--exact", "--test-threads=1"]).env(ASKED, "1").output();
+            let run =
+                std::process::Command::new(own).args([name, "--exact", "--test-threads=1"]).env(ASKED, "1").output();
             let run = run.expect("starts");
             assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stdout));
             return;

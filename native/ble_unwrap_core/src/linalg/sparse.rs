@@ -212,11 +212,9 @@ fn buffer(size: StackReq) -> Result<MemBuffer, SparseError> {
 /// An error of faer's analysis of so many entries.
 fn analysis_error(error: FaerError, entries: usize) -> SparseError {
     match error {
-        FaerError::IndexOverflow => SparseError::TooLarge,
-        FaerError::OutOfMemory => {
-            // faer does not say what it asked for: an index an entry, at least.
-            OutOfMemory::Refused { bytes: 4 * entries as u64 }.into()
-        }
+        // faer does not say what it asked for: an index an entry, at least.
+        FaerError::OutOfMemory => OutOfMemory::Refused { bytes: 4 * entries as u64 }.into(),
+        _ => SparseError::TooLarge,
     }
 }
 

@@ -31,7 +31,7 @@ pub enum EigenError {
 
 impl From<OutOfMemory> for EigenError {
     fn from(error: OutOfMemory) -> Self {
-        Self::Cancelled(error.into())
+        Self::Cancelled(Cancelled::OutOfMemory(error))
     }
 }
 

@@ -12,7 +12,7 @@ use super::search::{Best, Search};
 use super::shape::SAFETY_TEXELS;
 use super::sketch::{growth, most_promising};
 use super::{PackError, PackSettings, Pose, Quality, Rotation};
-use crate::Progress;
+use crate::{Cancelled, Progress};
 
 /// So many of the largest charts are tried in more angles than one: about so many in all, at least and at
 /// most so many a chart. Quarter turns of each come for free.
@@ -108,7 +108,7 @@ pub(super) fn densest(
     }
     let largest = outlines.iter().map(|o| o.extent).fold(0.0, f64::max);
     let area = |i: usize| outlines[i].area * (outlines[i].extent / largest).powi(2);
-    let turns = turns(outlines, &(0..n).map(area).collect::<Vec<_>>(), grid, settings);
+    let turns = turns(outlines, &(0..n).map(area).collect::<Vec<_>>(), grid, settings, progress)?;
     let fine = Search {
         outlines,
         turns: &turns,
@@ -136,7 +136,11 @@ pub(super) fn densest(
     for effort in Effort::new(n, settings.quality) {
         let coarse = Grid::coarse(settings, (effort.across * (n as f64).sqrt()).clamp(effort.least, effort.most));
         let lattice = |o: &Outline| (COARSENED * coarse.cell / (guess * o.extent)).clamp(1e-6, 0.1);
-        let simple: Vec<Outline> = outlines.par_iter().map(|o| o.coarsened(lattice(o))).collect();
+        let simple = |o: &Outline| {
+            progress.check()?;
+            Ok(o.coarsened(lattice(o)))
+        };
+        let simple: Vec<Outline> = outlines.par_iter().map(simple).collect::<Result<_, Cancelled>>()?;
         let search = Search {
             outlines: &simple,
             grid: coarse,
@@ -171,7 +175,13 @@ pub(super) fn densest(
 }
 
 /// Base angles to try, by chart; `areas` tell which are large.
-fn turns(outlines: &[Outline], areas: &[f64], grid: Grid, settings: &PackSettings) -> Vec<Vec<[f64; 2]>> {
+fn turns(
+    outlines: &[Outline],
+    areas: &[f64],
+    grid: Grid,
+    settings: &PackSettings,
+    progress: &Progress,
+) -> Result<Vec<Vec<[f64; 2]>>, Cancelled> {
     let n = outlines.len();
     let mut by_area: Vec<usize> = (0..n).collect();
     by_area.sort_by(|&a, &b| areas[b].total_cmp(&areas[a]).then(a.cmp(&b)));
@@ -179,10 +189,13 @@ fn turns(outlines: &[Outline], areas: &[f64], grid: Grid, settings: &PackSetting
     for &i in by_area.iter().take(LARGE) {
         angles[i] = ANGLES.div_ceil(n).clamp(LEAST_ANGLES, MOST_ANGLES);
     }
-    let turns = |i: usize| match settings.rotation {
-        // The given pose, in the frame of the grid.
-        Rotation::None if grid.sideways => vec![[0.0, 1.0]],
-        rotation => base_turns(&outlines[i], rotation, angles[i]),
+    let turns = |i: usize| {
+        progress.check()?;
+        Ok(match settings.rotation {
+            // The given pose, in the frame of the grid.
+            Rotation::None if grid.sideways => vec![[0.0, 1.0]],
+            rotation => base_turns(&outlines[i], rotation, angles[i]),
+        })
     };
     (0..n).into_par_iter().map(turns).collect()
 }

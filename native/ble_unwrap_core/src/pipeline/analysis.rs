@@ -15,7 +15,7 @@ use crate::settings::{ChartScale, LimitOver, Settings};
 use super::memo::{self, Fingerprint, Kind, Memo, Run};
 use super::rungs::Rungs;
 use super::tally::Tally;
-use super::{Atlas, Clock, budget, component, finish, ribbons};
+use super::{Atlas, Clock, budget, component, finish, needs, ribbons};
 
 /// A mesh and what was found out about it, for unwrapping it several times with different settings.
 ///
@@ -82,6 +82,7 @@ impl Analysis {
             face_offsets: &self.face_offsets,
             ..MeshInput::default()
         };
+        needs::require(&input, settings)?;
         self.memo.begin();
         self.prepared.unwrap(&input, settings, Clock::new(), &Run::new(progress, Some(&self.memo)))
     }

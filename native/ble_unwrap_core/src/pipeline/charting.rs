@@ -275,7 +275,9 @@ impl<'a> Attempt<'a> {
             }
             let flattened = match flatten::projected(patch, self.settings, rungs, self.progress)? {
                 Some(verdict) => verdict,
-                None if relief.as_ref().map_err(|c| *c)?.as_ref().is_some_and(|r| !r.is_promising()) => Flattened::Refused,
+                None if relief.as_ref().map_err(|c| *c)?.as_ref().is_some_and(|r| !r.is_promising()) => {
+                    Flattened::Refused
+                }
                 None => {
                     let (distances, analysis) = self.analysis()?;
                     self.flatten(patch, distances, analysis, rungs)?

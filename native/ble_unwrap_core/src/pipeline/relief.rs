@@ -194,14 +194,17 @@ mod tests {
     #[test]
     fn a_closed_body_is_cut_open_and_a_sheet_left_alone() {
         let long = whole(moved(&test_surfaces::sphere(3), |p| Point3::new(0.2 * p.x, 0.2 * p.y, p.z)));
-        let open =
-            of(&long, 1.1, |relief| relief.relieved().expect("memory")).expect("a spindle is rolled out by a cut from end to end");
+        let open = of(&long, 1.1, |relief| relief.relieved().expect("memory"))
+            .expect("a spindle is rolled out by a cut from end to end");
         assert!(open.mesh.topology().is_disk());
         assert!((measure::total_area(&open.mesh) - long.area()).abs() < 1e-12);
         let sheet = whole(test_surfaces::grid(12, 12, [2.0, 2.0], 0.0));
         assert!(of(&sheet, 1.1, |flat| flat.is_promising() && flat.relieved().expect("memory").is_none()));
         let ball = whole(test_surfaces::sphere(3));
-        assert!(of(&ball, 1.001, |relief| relief.relieved().expect("memory")).is_none(), "no six darts do for that limit");
+        assert!(
+            of(&ball, 1.001, |relief| relief.relieved().expect("memory")).is_none(),
+            "no six darts do for that limit"
+        );
     }
 
     #[test]

@@ -31,7 +31,9 @@ impl SpectralAnalysis {
         let mds = match classical_mds(&squared, distances.len(), KEPT) {
             Ok(mds) => mds,
             Err(EigenError::Cancelled(c)) => return Err(c),
-            Err(_) => return Ok(Self { eigenvalues: Vec::new(), dimension: 0, planarity: 0.0, coordinates: Vec::new() }),
+            Err(_) => {
+                return Ok(Self { eigenvalues: Vec::new(), dimension: 0, planarity: 0.0, coordinates: Vec::new() });
+            }
         };
         let total = mds.eigenvalues.iter().filter(|l| **l > 0.0).sum();
         let eigenvalues = mds.eigenvalues[..mds.dimensions].to_vec();

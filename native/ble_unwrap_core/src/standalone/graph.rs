@@ -344,7 +344,7 @@ mod tests {
         let cancelled = Progress::new();
         cancelled.cancel();
         let found = cloud_distances(&points, 4, None, &CloudDistanceSettings::default(), &cancelled);
-        assert_eq!(found, Err(CloudDistancesError::Cancelled(Cancelled)));
+        assert_eq!(found, Err(CloudDistancesError::Cancelled(Cancelled::OnRequest)));
         assert_eq!(distances(&[], None, &CloudDistanceSettings::default()), Ok(Vec::new()));
         assert_eq!(distances(&[1.0; 4], None, &CloudDistanceSettings::default()), Ok(vec![0.0]));
     }

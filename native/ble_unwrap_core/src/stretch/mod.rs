@@ -167,7 +167,7 @@ impl From<SparseError> for StretchError {
     fn from(error: SparseError) -> Self {
         match error {
             // No property of the chart: it must not be taken for one.
-            SparseError::OutOfMemory(error) => Self::Cancelled(error.into()),
+            SparseError::OutOfMemory(error) => Self::Cancelled(Cancelled::OutOfMemory(error)),
             other => Self::Solver(other),
         }
     }

@@ -1,6 +1,7 @@
 """Automatic UV unwrapping under a stretch bound, by Bernoulli logistic embedding."""
 
 import sys
+from collections.abc import Sequence
 from typing import Any, Literal, TypedDict, Unpack, final, type_check_only
 
 from typing_extensions import Buffer  # of collections.abc from Python 3.12 on
@@ -17,6 +18,7 @@ __all__ = [
     "InvalidArgumentError",
     "InvalidMeshError",
     "Job",
+    "OutOfMemoryError",
     "PackedCharts",
     "PointAtlas",
     "__version__",
@@ -74,7 +76,7 @@ class _EmbeddingSettings(_FitSettings, total=False):
 @type_check_only
 class _MeasureSettings(_Threads, total=False):
     margin: float
-    texture_size: int | tuple[int, int]
+    texture_size: int | Sequence[int]
 
 @type_check_only
 class _PackSettings(_MeasureSettings, total=False):

@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 
+use super::collapse::MOST_NEIGHBOURS;
 use crate::mesh::measure::area_vector;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::progress::{Cancelled, Progress};
@@ -11,7 +12,7 @@ use crate::progress::{Cancelled, Progress};
 const CHECK_EVERY: usize = 1024;
 
 /// For each face of `fine` the face of `coarse` nearest to its centroid among those at the vertices
-/// its corners went to. A coarse face turned away counts as further: on a thin sheet the two sides
+/// its corners went to; at vertices of more than [`MOST_NEIGHBOURS`] only if there is no other. A coarse face turned away counts as further: on a thin sheet the two sides
 /// are as near as the coarsening is inexact, and share the vertices of the rim.
 pub(super) fn nearest_faces(
     fine: &TriMesh,
@@ -20,6 +21,9 @@ pub(super) fn nearest_faces(
     progress: &Progress,
 ) -> Result<Vec<FaceId>, Cancelled> {
     let plates: Vec<Plate> = coarse.faces().map(|f| Plate::new(coarse.triangle_positions(f))).collect();
+    // All faces of a hub, asked for by each of its fine faces, would be quadratic; those on its rim know the ones near.
+    // Where all three corners are hubs the smallest is asked: the sum over a surface's triangles of that is linear.
+    let degree: Vec<u32> = coarse.vertices().map(|v| coarse.outgoing(v).count() as u32).collect();
     let nearest = |f: usize| {
         if f.is_multiple_of(CHECK_EVERY) {
             progress.check()?;
@@ -30,8 +34,10 @@ pub(super) fn nearest_faces(
         let normal = area_vector(p).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
         let roots = fine.triangle(f).map(|v| vertex[v.index()]);
         let mut best = (f64::INFINITY, FaceId::NONE);
+        let size = |root: VertexId| degree[root.index()];
+        let most = roots.iter().map(|&root| size(root)).min().unwrap_or(0).max(MOST_NEIGHBOURS);
         for (k, &root) in roots.iter().enumerate() {
-            if roots[..k].contains(&root) {
+            if roots[..k].contains(&root) || size(root) > most {
                 continue;
             }
             for h in coarse.outgoing(root) {
