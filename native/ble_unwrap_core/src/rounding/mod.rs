@@ -179,13 +179,14 @@ impl Mender<'_> {
             corners.sort_unstable_by_key(|&v| (self.mesh.is_boundary_vertex(v), v));
             order.extend(corners);
         }
-        if neighbours {
-            for i in 0..order.len() {
-                order.extend(self.mesh.neighbours(order[i]));
-            }
-        }
         let mut seen = std::collections::HashSet::new();
         order.retain(|&v| seen.insert(v));
+        if neighbours {
+            // Each of them once, or a vertex of many faces would name its neighbours for each of these.
+            for i in 0..order.len() {
+                order.extend(self.mesh.neighbours(order[i]).filter(|&v| seen.insert(v)));
+            }
+        }
         order
     }
 
