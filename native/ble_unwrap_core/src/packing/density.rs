@@ -225,3 +225,38 @@ fn first_guess(areas: impl Iterator<Item = f64>, settings: &PackSettings, grid: 
     let root = (b * b - a * c).max(0.0).sqrt() - b;
     if root > 0.0 && a > 0.0 { root / a } else { 1.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packing::PackItem;
+    use nalgebra::Point2;
+
+    #[test]
+    fn every_pass_over_the_charts_can_be_stopped() {
+        let points = [Point2::new(0.0, 0.0), Point2::new(1.0, 0.0), Point2::new(0.0, 1.0)];
+        let item = PackItem { points: &points, triangles: &[[0, 1, 2]] };
+        let outlines: Vec<Outline> = (0..9).map(|i| Outline::new(&item, i).expect("finite")).collect();
+        let settings = PackSettings::default();
+        let grid = Grid::new(&settings, outlines.len()).expect("room");
+        let stopped = Progress::new();
+        stopped.cancel();
+        let pass = |progress: &Progress| turns(&outlines, &[0.5; 9], grid, &settings, progress);
+        assert!(pass(&Progress::new()).is_ok());
+        assert_eq!(pass(&stopped), Err(Cancelled::OnRequest));
+        let turns = pass(&Progress::new()).expect("not cancelled");
+        let search = |progress| Search {
+            outlines: &outlines,
+            turns: &turns,
+            quarters: true,
+            grid,
+            growth: 0.0,
+            reach: Reach::new(0.0),
+            budget: 1,
+            progress,
+        };
+        assert!(search(&stopped).shapes(1.0).is_err());
+        let going = Progress::new();
+        assert_eq!(search(&going).shapes(1.0).map(|shapes| shapes.len()), Ok(9));
+    }
+}

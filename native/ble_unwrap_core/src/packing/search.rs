@@ -77,7 +77,7 @@ struct Attempt {
 }
 
 impl Search<'_> {
-    fn shapes(&self, density: f64) -> Result<Vec<Shape>, Cancelled> {
+    pub(super) fn shapes(&self, density: f64) -> Result<Vec<Shape>, Cancelled> {
         let shape = |i: usize| {
             self.progress.check()?;
             let Self { outlines, turns, grid, growth, .. } = self;

@@ -12,7 +12,7 @@ use crate::metrics::{self, Texture, UvMesh, UvMeshError};
 use crate::packing::{self, PackItem, Packed};
 use crate::progress::{Cancelled, Stage};
 use crate::report::Report;
-use crate::rounding::{self, Rounding};
+use crate::rounding::{self, Rounding, RoundingError};
 use crate::segmentation;
 use crate::settings::{ChartScale, LimitOver, Settings};
 use crate::verify::{self, Certificate};
@@ -210,9 +210,10 @@ impl Layout {
                 Point2::new(texel.x / size[0], texel.y / size[1])
             };
             let exact: Vec<Point2<f64>> = chart.uv.iter().map(place).collect();
-            let uv = match rounding::round_to_f32(&chart.patch.mesh, &exact, &rounding) {
+            let uv = match rounding::round_to_f32(&chart.patch.mesh, &exact, &rounding, progress) {
                 Ok(rounded) => rounded.uv,
-                Err(unmendable) => {
+                Err(RoundingError::Cancelled(cancelled)) => return Err(cancelled.into()),
+                Err(RoundingError::Unmendable(unmendable)) => {
                     let faces = unmendable.faces.iter().map(|f| (number, chart.patch.faces[f.index()]));
                     layout.broken.extend(faces);
                     unmendable.uv
