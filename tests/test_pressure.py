@@ -50,7 +50,7 @@ def test_memory_decides_whether_there_is_a_result_never_which():
         found = unwrapped_within(room)
         if found.startswith("refused"):
             refused.append(room)
-            assert "memory" in found and "bytes" in found
+            assert "memory" in found and ("bytes" in found or "threads" in found)
         else:
             assert found == whole, f"{room} MiB: another result"
             made.append(room)
@@ -136,7 +136,13 @@ def test_arrays_travel_alone_and_empty(hill):
 
 @pytest.mark.parametrize(
     ("data", "format", "shape"),
-    [(b"1234567", "f", (1,)), (b"12345678", "f", (3,)), (b"1234", "q", (1,)), (b"1234", "f", ()), (b"", "f", (0, 2**62))],
+    [
+        (b"1234567", "f", (1,)),
+        (b"12345678", "f", (3,)),
+        (b"1234", "q", (1,)),
+        (b"1234", "f", ()),
+        (b"", "f", (0, 2**62)),
+    ],
 )
 def test_an_array_of_wrong_bytes_is_refused(data, format, shape):
     if shape == (0, 2**62):

@@ -81,9 +81,10 @@ impl Failure {
         Self { kind: Kind::Internal, text: format!("unexpected panic: {text}") }
     }
 
-    /// The system gave no thread to work on.
+    /// The system gave no thread to work on: for want of memory for its stack, or of a limit on processes.
     pub(crate) fn threads(error: &dyn std::error::Error) -> Self {
-        Self { kind: Kind::Internal, text: format!("cannot start threads: {error}") }
+        let text = format!("out of memory: cannot start threads ({error}); close something else, or raise the limits");
+        Self { kind: Kind::Memory, text }
     }
 
     /// The result could not become a Python object.
