@@ -92,7 +92,7 @@ def test_many_small_charts_have_a_worst():
     rng = np.random.default_rng(3)
     positions = rng.random((count, 1, 3)) * 100 + np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
     corners = np.arange(3 * count, dtype=np.int32)
-    report = unwrap(positions.reshape(-1, 3), corners, corners[::3].tolist() + [3 * count], texture_size=4096, margin=0)
+    report = unwrap(positions.reshape(-1, 3), corners, [*corners[::3].tolist(), 3 * count], texture_size=4096, margin=0)
     assert report["charts"] == count and np.isfinite(report["l2_worst_chart"])
 
 
@@ -145,9 +145,6 @@ def test_arrays_travel_alone_and_empty(hill):
     ],
 )
 def test_an_array_of_wrong_bytes_is_refused(data, format, shape):
-    if shape == (0, 2**62):
-        assert len(native.Array(data, format, shape)) == 0
-        return
     with pytest.raises(native.InvalidArgumentError):
         native.Array(data, format, shape)
 
@@ -160,14 +157,14 @@ BOOLEANS = [True, False, np.True_, np.False_]
 @pytest.mark.parametrize("name", [k for k, v in native.default_settings().items() if type(v) in (int, float)])
 @pytest.mark.parametrize("value", BOOLEANS, ids=repr)
 def test_no_boolean_is_a_number(square, name, value):
-    with pytest.raises(native.InvalidArgumentError, match=f"^{name}: expected .* number"):
+    with pytest.raises(native.InvalidArgumentError, match=rf"^{name}: expected .* number"):
         native.unwrap(*square, **{name: value})
 
 
 @pytest.mark.parametrize("value", BOOLEANS, ids=repr)
 def test_no_boolean_is_a_size(square, value):
     for size in (value, (value, 64), [64, value]):
-        with pytest.raises(native.InvalidArgumentError, match="^texture_size: "):
+        with pytest.raises(native.InvalidArgumentError, match=r"^texture_size: "):
             native.unwrap(*square, texture_size=size)
 
 
@@ -177,7 +174,7 @@ def test_any_sequence_of_two_is_a_pair(square):
     for size in (list(pair), np.array(pair), np.array(pair, np.uint16), range(64, 0, -32)):
         assert_array_equal(arrays(unwrap(*square, texture_size=size))[0], expected)
     for size in ("64", b"@ ", [64], [64, 32, 16], {}, [64.5, 32], None, {64, 32}):
-        with pytest.raises(native.InvalidArgumentError, match="^texture_size: "):
+        with pytest.raises(native.InvalidArgumentError, match=r"^texture_size: "):
             unwrap(*square, texture_size=size)
 
 

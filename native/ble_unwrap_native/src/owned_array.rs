@@ -133,8 +133,12 @@ impl Array {
                 )));
             }
         };
-        let count = shape.iter().try_fold(elements.item_size(), |bytes, &length| bytes.checked_mul(length));
-        if !(1..=2).contains(&shape.len()) || count != Some(bytes.len()) {
+        let bytes_of = |lengths: &mut dyn Iterator<Item = usize>| {
+            lengths.try_fold(elements.item_size(), usize::checked_mul).filter(|&bytes| isize::try_from(bytes).is_ok())
+        };
+        // Distances along the dimensions are counted where there are no elements, too.
+        let fits = bytes_of(&mut shape.iter().map(|&length| length.max(1))).is_some();
+        if !(1..=2).contains(&shape.len()) || !fits || bytes_of(&mut shape.iter().copied()) != Some(bytes.len()) {
             return Err(InvalidArgumentError::new_err(format!(
                 "shape: expected one or two lengths of {} elements together; found {shape:?}",
                 elements.len()
