@@ -28,7 +28,7 @@ def certify(found, *, stretch_limit=None, warnings=()):
     if found["points_unmapped"]:
         certificate.violations.append(f"{points_text(found['points_unmapped'])} without UVs: not finite")
     worst = found.get("l2_worst_chart")
-    if stretch_limit is not None and worst is not None and worst > stretch_limit + STRETCH_SLACK:
+    if stretch_limit is not None and worst is not None and not worst <= stretch_limit + STRETCH_SLACK:
         certificate.violations.append(f"worst chart has stretch {worst:.3f}, limit is {stretch_limit:g}")
     return certificate
 

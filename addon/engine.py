@@ -258,11 +258,13 @@ def certify(measured, *, margin, stretch_limit=None, limit_over="CHART", warning
     if measured.get("unmapped_faces"):
         certificate.violations.append(counted(measured["unmapped_faces"], "face") + " without UVs")
     gap = measured.get("gap_texels")
-    if gap is not None and np.isfinite(gap) and measured.get("charts", 0) > 1 and gap < margin - MARGIN_SLACK_TEXELS:
+    # Asked the way round in which what could not be measured, NaN, does not pass.
+    if gap is not None and measured.get("charts", 0) > 1 and not gap >= margin - MARGIN_SLACK_TEXELS:
         certificate.violations.append(f"charts {gap:.2f} px apart, margin is {margin:g} px")
     limited, name = _limited(measured, limit_over)
-    if stretch_limit is not None and limited is not None and limited > stretch_limit + STRETCH_SLACK:
-        certificate.violations.append(f"{name} has stretch {limited:.3f}, limit is {stretch_limit:g}")
+    if stretch_limit is not None and limited is not None and not limited <= stretch_limit + STRETCH_SLACK:
+        found = "a stretch that could not be measured" if np.isnan(limited) else f"stretch {limited:.3f}"
+        certificate.violations.append(f"{name} has {found}, limit is {stretch_limit:g}")
     return certificate
 
 

@@ -175,7 +175,7 @@ fn segmentation(criterion: &mut Criterion, one: &ThreadPool) {
         let make = || {
             let patch = Polygons::of(surfaces::sculpt(cells)).patch();
             let distances = measured(&patch.mesh);
-            let analysis = SpectralAnalysis::new(&distances);
+            let analysis = SpectralAnalysis::new(&distances).expect("memory");
             (patch, distances, analysis)
         };
         case(
@@ -184,7 +184,7 @@ fn segmentation(criterion: &mut Criterion, one: &ThreadPool) {
             BenchmarkId::new("analysis", 12 * cells * cells),
             12 * cells * cells,
             make,
-            |(_, distances, _)| SpectralAnalysis::new(distances),
+            |(_, distances, _)| SpectralAnalysis::new(distances).expect("memory"),
             |_, analysis| analysis.dimension >= 2 && analysis.planarity < 0.9,
         );
         case(

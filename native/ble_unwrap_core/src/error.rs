@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::memory::OutOfMemory;
 use crate::mesh::MeshError;
 use crate::metrics::UvMeshError;
 use crate::packing::PackError;
@@ -29,16 +30,28 @@ pub enum UnwrapError {
     /// The result does not fit the checks, which take 2³⁰ triangles.
     #[error(transparent)]
     Check(#[from] UvMeshError),
+    /// There is not enough memory: seen beforehand, or a piece of it was refused.
+    #[error(transparent)]
+    OutOfMemory(#[from] OutOfMemory),
     /// The caller asked to stop.
     #[error(transparent)]
-    Cancelled(#[from] Cancelled),
+    Cancelled(Cancelled),
+}
+
+impl From<Cancelled> for UnwrapError {
+    fn from(cancelled: Cancelled) -> Self {
+        match cancelled {
+            Cancelled::OnRequest => Self::Cancelled(cancelled),
+            Cancelled::OutOfMemory(error) => Self::OutOfMemory(error),
+        }
+    }
 }
 
 impl From<MeshError> for UnwrapError {
     fn from(error: MeshError) -> Self {
         // A stop is a stop, whichever stage it came in.
         match error {
-            MeshError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            MeshError::Cancelled(cancelled) => cancelled.into(),
             other => Self::Mesh(other),
         }
     }
@@ -47,7 +60,7 @@ impl From<MeshError> for UnwrapError {
 impl From<PackError> for UnwrapError {
     fn from(error: PackError) -> Self {
         match error {
-            PackError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            PackError::Cancelled(cancelled) => cancelled.into(),
             other => Self::Pack(other),
         }
     }

@@ -30,6 +30,7 @@ mod error;
 pub mod flattening;
 pub mod geodesics;
 pub mod linalg;
+pub mod memory;
 pub mod mesh;
 pub mod metrics;
 pub mod packing;

@@ -4,10 +4,18 @@ use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 
 use thiserror::Error;
 
-/// The computation was asked to stop and did; nothing was produced.
+use crate::memory::{self, OutOfMemory};
+
+/// The computation was broken off; nothing was produced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[error("cancelled")]
-pub struct Cancelled;
+pub enum Cancelled {
+    /// It was asked to stop.
+    #[error("cancelled")]
+    OnRequest,
+    /// There was no memory to go on with.
+    #[error(transparent)]
+    OutOfMemory(OutOfMemory),
+}
 
 /// What the pipeline is doing, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -60,12 +68,25 @@ impl Stage {
 ///
 /// [`Progress::fraction`] only rises. Cancelling is cooperative: the computation looks at the flag
 /// at least every few milliseconds of work per thread.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Progress {
     cancelled: AtomicBool,
+    /// Refused allocations in this process when it began: one more ends it.
+    refusals: AtomicU64,
     stage: AtomicU8,
     /// The fraction as the bits of a non-negative f64, whose order is that of the integers.
     fraction: AtomicU64,
+}
+
+impl Default for Progress {
+    fn default() -> Self {
+        Self {
+            cancelled: AtomicBool::new(false),
+            refusals: AtomicU64::new(memory::refusals()),
+            stage: AtomicU8::new(Stage::Waiting as u8),
+            fraction: AtomicU64::new(0.0f64.to_bits()),
+        }
+    }
 }
 
 impl Progress {
@@ -73,6 +94,11 @@ impl Progress {
     #[must_use]
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// The computation starts now: what was refused to others while it waited is no concern of it.
+    pub fn begin(&self) {
+        self.refusals.store(memory::refusals(), Ordering::Relaxed);
     }
 
     /// Asks the computation to stop. It returns [`Cancelled`] soon after.
@@ -89,9 +115,13 @@ impl Progress {
     /// Fails once cancelled: stages write `progress.check()?` in their loops.
     ///
     /// # Errors
-    /// [`Cancelled`] after [`Progress::cancel`].
+    /// [`Cancelled::OnRequest`] after [`Progress::cancel`], [`Cancelled::OutOfMemory`] after
+    /// [`note_refusal`](memory::note_refusal).
     pub fn check(&self) -> Result<(), Cancelled> {
-        if self.is_cancelled() { Err(Cancelled) } else { Ok(()) }
+        if self.is_cancelled() {
+            return Err(Cancelled::OnRequest);
+        }
+        memory::none_since(self.refusals.load(Ordering::Relaxed)).map_err(Cancelled::OutOfMemory)
     }
 
     /// The current stage.
@@ -149,6 +179,6 @@ mod tests {
         let p = Progress::new();
         assert_eq!(p.check(), Ok(()));
         p.cancel();
-        assert_eq!(p.check(), Err(Cancelled));
+        assert_eq!(p.check(), Err(Cancelled::OnRequest));
     }
 }

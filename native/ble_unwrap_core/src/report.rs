@@ -2,7 +2,8 @@
 
 use crate::metrics::Measures;
 
-/// Quality and history of an unwrapped mesh. Distortions as in [`Measures`].
+/// Quality and history of an unwrapped mesh. Distortions as in [`Measures`]: NaN where not one triangle could be measured,
+/// of which a warning tells.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
     /// Number of charts.
@@ -15,7 +16,7 @@ pub struct Report {
     pub l2: f64,
     /// L2 stretch with every chart at its own best scale.
     pub l2_chart_scale: f64,
-    /// L2 stretch of the worst chart, charts under 1e-4 of the surface aside.
+    /// L2 stretch of the worst chart; specks aside, as in [`Measures`].
     pub l2_worst_chart: f64,
     /// That chart.
     pub worst_chart: Option<usize>,

@@ -49,6 +49,15 @@ fn judge(input: &MeshInput<'_>, settings: &Settings, atlas: &Atlas) -> Result<(C
     Ok((certificate, measures))
 }
 
+/// Whether the report counts the charts that the labels tell apart.
+fn counted_as_labelled(atlas: &Atlas) -> Result<(), String> {
+    let mut labels: Vec<i32> = atlas.chart.iter().copied().filter(|&c| c >= 0).collect();
+    labels.sort_unstable();
+    labels.dedup();
+    let (told, labels) = (atlas.report.charts, labels.len());
+    if told == labels { Ok(()) } else { Err(format!("{told} charts in the report, {labels} by their labels")) }
+}
+
 /// Whether an atlas keeps every promise.
 fn check(input: &MeshInput<'_>, settings: &Settings, atlas: &Atlas) -> Result<Measures, String> {
     let (certificate, measures) = judge(input, settings, atlas)?;
@@ -73,6 +82,7 @@ fn check(input: &MeshInput<'_>, settings: &Settings, atlas: &Atlas) -> Result<Me
     if labels != (0..labels.len() as i32).collect::<Vec<_>>() {
         return Err("charts are not numbered from 0".into());
     }
+    counted_as_labelled(atlas)?;
     Ok(measures)
 }
 
@@ -322,7 +332,10 @@ proptest! {
         // Small, for speed.
         (settings.packing.width, settings.packing.height, settings.packing.margin_texels) = (512, 512, 2.0);
         match unwrap(&input, &settings, &Progress::new()) {
-            Ok(atlas) if weld => prop_assert!(judge(&input, &settings, &atlas).is_ok_and(|(c, _)| c.is_valid())),
+            Ok(atlas) if weld => {
+                prop_assert!(judge(&input, &settings, &atlas).is_ok_and(|(c, _)| c.is_valid()));
+                prop_assert_eq!(counted_as_labelled(&atlas), Ok(()));
+            }
             Ok(atlas) => {
                 if let Err(broken) = check(&input, &settings, &atlas) {
                     prop_assert!(false, "{}", broken);

@@ -4,6 +4,7 @@
 //! array), contiguous or not, aligned or not. The copy is made while the interpreter is held:
 //! afterwards Python may write to its buffer, and the computation does not notice.
 
+use ble_unwrap_core::memory;
 use pyo3::buffer::{ElementType, PyUntypedBuffer};
 use pyo3::prelude::*;
 use pyo3::types::PyMemoryView;
@@ -166,16 +167,15 @@ impl<'py> View<'py> {
     /// An empty vector with room for `count` values. Counts are limited to 32 bits, as indices are,
     /// before memory is asked for: a broadcast array can be larger than the machine.
     fn reserve<T>(&self, count: usize) -> PyResult<Vec<T>> {
-        let mut values = Vec::new();
-        if i32::try_from(self.rows()).is_err() || values.try_reserve_exact(count).is_err() {
-            return Err(InvalidArgumentError::new_err(format!(
+        let rows = i32::try_from(self.rows()).ok();
+        rows.and_then(|_| memory::required(count).ok()).ok_or_else(|| {
+            InvalidArgumentError::new_err(format!(
                 "{}: expected at most {} rows that fit in memory, found shape {}",
                 self.argument.name,
                 i32::MAX,
                 shape_text(&self.shape)
-            )));
-        }
-        Ok(values)
+            ))
+        })
     }
 
     fn real(&self, at: [usize; 2]) -> PyResult<f64> {

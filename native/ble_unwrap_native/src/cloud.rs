@@ -3,7 +3,7 @@
 use ble_unwrap_core::CloudReport;
 use ble_unwrap_core::cloud;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyType};
 
 use crate::arrays::{self, Argument};
 use crate::errors::Failure;
@@ -31,6 +31,18 @@ pub(crate) struct PointAtlas {
 
 #[pymethods]
 impl PointAtlas {
+    #[new]
+    #[pyo3(signature = (uv, chart, report, /))]
+    fn new(uv: Py<Array>, chart: Py<Array>, report: Py<PyDict>) -> Self {
+        Self { uv, chart, report }
+    }
+
+    /// For `pickle` and `copy`.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (Py<Array>, Py<Array>, Py<PyDict>)) {
+        let (py, of) = (slf.py(), slf.get());
+        (slf.get_type(), (of.uv.clone_ref(py), of.chart.clone_ref(py), of.report.clone_ref(py)))
+    }
+
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let report = self.report.bind(py);
         let of = |key| report.get_item(key).map(|value| value.map_or_else(String::new, |value| value.to_string()));

@@ -3,14 +3,17 @@
 use std::fmt::Display;
 
 use ble_unwrap_core::embedding::EmbeddingError;
+use ble_unwrap_core::memory::OutOfMemory;
 use ble_unwrap_core::mesh::MeshError;
 use ble_unwrap_core::packing::PackError;
 use ble_unwrap_core::standalone::{CloudDistancesError, DistancesError, FlattenError, LayoutError, RepackError};
 use ble_unwrap_core::stretch::StretchError;
 use ble_unwrap_core::{CloudError, UnwrapError};
 use pyo3::create_exception;
-use pyo3::exceptions::PyException;
+use pyo3::exceptions::{PyException, PyMemoryError};
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyDict, PyType};
 
 create_exception!(ble_unwrap_native, BleUnwrapError, PyException, "Base of all exceptions of this module.");
 create_exception!(
@@ -38,6 +41,23 @@ create_exception!(
     "A defect of this library or a want of the machine, not of the input. Please report it."
 );
 
+/// `OutOfMemoryError`, of this module's exceptions and Python's `MemoryError`, too: PyO3's macro takes one base only.
+fn out_of_memory_error(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
+    static TYPE: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    let make = || {
+        let bases = (py.get_type::<BleUnwrapError>(), py.get_type::<PyMemoryError>());
+        let body = PyDict::new(py);
+        body.set_item("__module__", "ble_unwrap_native")?;
+        body.set_item(
+            "__doc__",
+            "There is not enough memory, found before the work began or while it went on. The text tells how much was \
+             asked for. Nothing was produced.",
+        )?;
+        Ok(py.get_type::<PyType>().call1(("OutOfMemoryError", bases, body))?.cast_into::<PyType>()?.unbind())
+    };
+    TYPE.get_or_try_init(py, make).map(|kind| kind.bind(py))
+}
+
 /// Why a computation brought no result, as the worker leaves it: the exception to raise, and its text, which
 /// is the core's own.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,6 +71,7 @@ enum Kind {
     Mesh,
     Argument,
     Cancelled,
+    Memory,
     Internal,
 }
 
@@ -60,9 +81,10 @@ impl Failure {
         Self { kind: Kind::Internal, text: format!("unexpected panic: {text}") }
     }
 
-    /// The system gave no thread to work on.
+    /// The system gave no thread to work on: for want of memory for its stack, or of a limit on processes.
     pub(crate) fn threads(error: &dyn std::error::Error) -> Self {
-        Self { kind: Kind::Internal, text: format!("cannot start threads: {error}") }
+        let text = format!("out of memory: cannot start threads ({error}); close something else, or raise the limits");
+        Self { kind: Kind::Memory, text }
     }
 
     /// The result could not become a Python object.
@@ -77,6 +99,10 @@ impl Failure {
             Kind::Mesh => InvalidMeshError::new_err(text),
             Kind::Argument => InvalidArgumentError::new_err(text),
             Kind::Cancelled => Cancelled::new_err(text),
+            Kind::Memory => Python::attach(|py| match out_of_memory_error(py) {
+                Ok(kind) => PyErr::from_type(kind.clone(), text),
+                Err(error) => error,
+            }),
             Kind::Internal => InternalError::new_err(text),
         }
     }
@@ -95,7 +121,16 @@ impl<E: Raised> From<E> for Failure {
 
 impl Raised for ble_unwrap_core::Cancelled {
     fn kind(&self) -> Kind {
-        Kind::Cancelled
+        match self {
+            Self::OnRequest => Kind::Cancelled,
+            Self::OutOfMemory(error) => error.kind(),
+        }
+    }
+}
+
+impl Raised for OutOfMemory {
+    fn kind(&self) -> Kind {
+        Kind::Memory
     }
 }
 
@@ -140,6 +175,7 @@ impl Raised for UnwrapError {
             Self::Setting { .. } => Kind::Argument,
             Self::Pack(error) => error.kind(),
             Self::Check(_) => Kind::Mesh,
+            Self::OutOfMemory(error) => error.kind(),
             Self::Cancelled(error) => error.kind(),
         }
     }
@@ -266,5 +302,6 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("InvalidMeshError", py.get_type::<InvalidMeshError>())?;
     module.add("InvalidArgumentError", py.get_type::<InvalidArgumentError>())?;
     module.add("Cancelled", py.get_type::<Cancelled>())?;
+    module.add("OutOfMemoryError", out_of_memory_error(py)?)?;
     module.add("InternalError", py.get_type::<InternalError>())
 }

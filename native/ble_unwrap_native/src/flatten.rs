@@ -2,7 +2,7 @@
 
 use ble_unwrap_core::standalone::{self, FlattenReport, MapQuality};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict};
+use pyo3::types::{PyBool, PyDict, PyType};
 
 use crate::errors::Failure;
 use crate::job::Job;
@@ -32,6 +32,18 @@ pub(crate) struct Flattening {
 
 #[pymethods]
 impl Flattening {
+    #[new]
+    #[pyo3(signature = (embedded, uv, report, /))]
+    fn new(embedded: Py<Array>, uv: Py<Array>, report: Py<PyDict>) -> Self {
+        Self { embedded, uv, report }
+    }
+
+    /// For `pickle` and `copy`.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (Py<Array>, Py<Array>, Py<PyDict>)) {
+        let (py, of) = (slf.py(), slf.get());
+        (slf.get_type(), (of.embedded.clone_ref(py), of.uv.clone_ref(py), of.report.clone_ref(py)))
+    }
+
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let report = self.report.bind(py);
         let of = |key| report.get_item(key).map(|value| value.map_or_else(String::new, |value| value.to_string()));

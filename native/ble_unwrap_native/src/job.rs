@@ -11,7 +11,9 @@ use std::time::{Duration, Instant};
 
 use ble_unwrap_core::{Progress, Stage};
 use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use crate::allocator;
 use crate::errors::{Failure, InvalidArgumentError};
 
 /// Turns the output of a computation into a Python object, once, with the interpreter held.
@@ -109,9 +111,14 @@ impl Job {
         }
         let shared = Arc::clone(&self.shared);
         let run = move || {
+            shared.progress.begin();
             let outcome = catch_unwind(AssertUnwindSafe(|| {
                 shared.progress.check().map_err(Failure::from)?;
-                with_threads(threads, || work(&shared.progress))
+                with_threads(threads, || {
+                    // After the threads: they cannot be had from the reserve.
+                    allocator::hold_reserve();
+                    work(&shared.progress)
+                })
             }));
             let outcome = outcome.unwrap_or_else(|panic| Err(Failure::panic(&panic_text(&*panic))));
             if outcome.is_ok() {
@@ -296,15 +303,25 @@ fn forked() -> bool {
 
 /// Runs `work` with at most `threads` threads of its own, or on the shared ones if that is 0.
 fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T, Failure> + Send) -> Result<T, Failure> {
-    if threads == 0 && !forked() {
-        return work();
+    if threads == 0 && !forked() { shared_pool()?.install(work) } else { pool(threads)?.install(work) }
+}
+
+/// As many threads as the machine has, made at the first call. Rayon's own are not used: where they cannot be started it
+/// panics at every later call, too.
+fn shared_pool() -> Result<Arc<ThreadPool>, Failure> {
+    static SHARED: Mutex<Option<Arc<ThreadPool>>> = Mutex::new(None);
+    let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(pool) = &*shared {
+        return Ok(Arc::clone(pool));
     }
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .thread_name(|i| format!("ble_unwrap_{i}"))
-        .build()
-        .map_err(|error| Failure::threads(&error))?;
-    pool.install(work)
+    let pool = Arc::new(pool(0)?);
+    *shared = Some(Arc::clone(&pool));
+    Ok(pool)
+}
+
+fn pool(threads: usize) -> Result<ThreadPool, Failure> {
+    let builder = ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("ble_unwrap_{i}"));
+    builder.build().map_err(|error| Failure::threads(&error))
 }
 
 fn panic_text(panic: &(dyn Any + Send)) -> String {

@@ -1,5 +1,6 @@
 //! Python bindings of BLE Unwrap: converts, calls the core, converts back. Registration alone is here.
 
+mod allocator;
 mod analysis;
 mod arrays;
 mod cloud;

@@ -26,7 +26,7 @@ use crate::unwrap::MeshArrays;
 ///     A new ``Job``, by which another thread watches or cancels this call.
 /// weld, weld_distance : bool, float or None
 ///     As for ``unwrap``: which vertices count as one. Without ``weld`` an edge between two vertices of the mesh is no seam.
-/// texture_size : int or (int, int)
+/// texture_size : int or two ints
 ///     Width and height of the texture in texels.
 /// margin : float
 ///     Distance of charts, in texels, at least up to half of which gaps are searched for.

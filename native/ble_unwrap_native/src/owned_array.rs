@@ -5,7 +5,9 @@ use std::ffi::{CStr, c_int};
 use pyo3::exceptions::PyBufferError;
 use pyo3::ffi;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyBytes, PyTuple, PyType};
+
+use crate::errors::InvalidArgumentError;
 
 /// A read-only array of numbers that a computation returned.
 ///
@@ -68,6 +70,11 @@ impl Elements {
     }
 }
 
+/// Elements of `N` bytes each; what is left at the end is no element.
+fn read<T, const N: usize>(bytes: &[u8], element: impl Fn([u8; N]) -> T) -> Vec<T> {
+    bytes.as_chunks().0.iter().map(|chunk| element(*chunk)).collect()
+}
+
 impl Array {
     fn new(elements: Elements, shape: &[usize]) -> Self {
         assert_eq!(shape.iter().product::<usize>(), elements.len(), "the shape has as many elements as the data");
@@ -111,6 +118,48 @@ impl Array {
 
 #[pymethods]
 impl Array {
+    /// An array of these bytes: its elements row by row, the lowest byte first.
+    #[new]
+    #[pyo3(signature = (data, format, shape, /))]
+    fn from_bytes(data: &Bound<'_, PyBytes>, format: &str, shape: Vec<usize>) -> PyResult<Self> {
+        let bytes = data.as_bytes();
+        let elements = match format {
+            "f" => Elements::F32(read(bytes, f32::from_le_bytes)),
+            "d" => Elements::F64(read(bytes, f64::from_le_bytes)),
+            "i" => Elements::I32(read(bytes, i32::from_le_bytes)),
+            _ => {
+                return Err(InvalidArgumentError::new_err(format!(
+                    "format: expected 'f', 'd' or 'i'; found {format:?}"
+                )));
+            }
+        };
+        let bytes_of = |lengths: &mut dyn Iterator<Item = usize>| {
+            lengths.try_fold(elements.item_size(), usize::checked_mul).filter(|&bytes| isize::try_from(bytes).is_ok())
+        };
+        // Distances along the dimensions are counted where there are no elements, too.
+        let fits = bytes_of(&mut shape.iter().map(|&length| length.max(1))).is_some();
+        if !(1..=2).contains(&shape.len()) || !fits || bytes_of(&mut shape.iter().copied()) != Some(bytes.len()) {
+            return Err(InvalidArgumentError::new_err(format!(
+                "shape: expected one or two lengths of {} elements together; found {shape:?}",
+                elements.len()
+            )));
+        }
+        Ok(Self::new(elements, &shape))
+    }
+
+    /// For `pickle` and `copy`.
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyType>, (Bound<'py, PyBytes>, String, Bound<'py, PyTuple>))> {
+        let (py, array) = (slf.py(), slf.get());
+        let bytes: Vec<u8> = match &array.elements {
+            Elements::F32(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
+            Elements::F64(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
+            Elements::I32(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
+        };
+        Ok((slf.get_type(), (PyBytes::new(py, &bytes), array.format(), array.shape(py)?)))
+    }
+
     #[getter]
     fn shape<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         PyTuple::new(py, &self.shape)

@@ -2,7 +2,7 @@
 
 use ble_unwrap_core::standalone::repack;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyType};
 
 use crate::arrays::{self, Argument};
 use crate::errors::Failure;
@@ -25,6 +25,21 @@ pub(crate) struct PackedCharts {
     report: Py<PyDict>,
 }
 
+#[pymethods]
+impl PackedCharts {
+    #[new]
+    #[pyo3(signature = (uv, report, /))]
+    fn new(uv: Py<Array>, report: Py<PyDict>) -> Self {
+        Self { uv, report }
+    }
+
+    /// For `pickle` and `copy`.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (Py<Array>, Py<PyDict>)) {
+        let (py, of) = (slf.py(), slf.get());
+        (slf.get_type(), (of.uv.clone_ref(py), of.report.clone_ref(py)))
+    }
+}
+
 /// Move, turn and scale charts so that they fill the unit square and keep their margin.
 ///
 /// Parameters
@@ -39,7 +54,7 @@ pub(crate) struct PackedCharts {
 ///     A new ``Job``, by which another thread watches or cancels this call.
 /// margin : float
 ///     Least distance between charts, in texels; half of it is kept to the border.
-/// texture_size : int or (int, int)
+/// texture_size : int or two ints
 ///     Width and height of the texture in texels. Charts keep their shape in texels.
 /// rotation : {"any", "quarter", "none"}
 ///     How charts may be turned. They are never mirrored.

@@ -5,7 +5,7 @@ use ble_unwrap_core::packing::PackSettings;
 use ble_unwrap_core::segmentation::SegmentationSettings;
 use ble_unwrap_core::{NEVER_SEWN, Settings};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyString};
+use pyo3::types::{PyBool, PyBytes, PyDict, PyString};
 
 use crate::errors::InvalidArgumentError;
 use crate::words::{Words, words};
@@ -287,10 +287,7 @@ impl Setting {
             }
             Field::Seed(field) => *field(call) = whole(name, value, [0, u64::MAX], "")?,
             Field::Size(field, range) => {
-                let sides: [Bound<'_, PyAny>; 2] = match value.extract() {
-                    Ok((width, height)) => [width, height],
-                    Err(_) => [value.clone(), value.clone()],
-                };
+                let sides = pair(value).unwrap_or_else(|| [value.clone(), value.clone()]);
                 let [width, height] = field(call);
                 let texels = " texels, or a pair of them";
                 *width = whole(name, &sides[0], *range, texels)?;
@@ -323,19 +320,34 @@ pub(crate) fn flag(name: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
     value.extract().map_err(|_| refusal(name, "True or False", value))
 }
 
+/// A number. A boolean is an int to Python, and one of NumPy a number, but nobody who writes one means it.
+fn as_number<'py, T: FromPyObjectOwned<'py>>(value: &Bound<'py, PyAny>) -> Option<T> {
+    let is_boolean = value.is_instance_of::<PyBool>()
+        || value.get_type().name().is_ok_and(|name| ["bool", "bool_"].iter().any(|known| name == *known));
+    if is_boolean { None } else { value.extract().ok() }
+}
+
+/// The two elements of a sequence of two, such as a tuple, a list or an array.
+fn pair<'py>(value: &Bound<'py, PyAny>) -> Option<[Bound<'py, PyAny>; 2]> {
+    if value.is_instance_of::<PyString>() || value.is_instance_of::<PyBytes>() || value.len().ok()? != 2 {
+        return None;
+    }
+    Some([value.get_item(0).ok()?, value.get_item(1).ok()?])
+}
+
 fn real(name: &str, value: &Bound<'_, PyAny>, interval: Interval, or: &str) -> PyResult<f64> {
-    let found = value.extract().ok().filter(|&x: &f64| interval.contains(x));
+    let found = as_number(value).filter(|&x: &f64| interval.contains(x));
     found.ok_or_else(|| refusal(name, &format!("{}{or}", interval.text()), value))
 }
 
 /// A number; its range is the core's to check.
 pub(crate) fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
-    value.extract().map_err(|_| refusal(name, "a number", value))
+    as_number(value).ok_or_else(|| refusal(name, "a number", value))
 }
 
 /// A finite number above 0; `or` ends its description.
 pub(crate) fn positive(name: &str, value: &Bound<'_, PyAny>, or: &str) -> PyResult<f64> {
-    let found = value.extract().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
+    let found = as_number(value).filter(|x: &f64| x.is_finite() && *x > 0.0);
     found.ok_or_else(|| refusal(name, &format!("a number above 0{or}"), value))
 }
 
@@ -344,9 +356,7 @@ pub(crate) fn whole<T>(name: &str, value: &Bound<'_, PyAny>, [least, most]: [T; 
 where
     T: Copy + PartialOrd + std::fmt::Display + TryFrom<u64>,
 {
-    // A boolean is an int to Python, but nobody who writes one means a number.
-    let number = if value.is_instance_of::<PyBool>() { None } else { value.extract::<u64>().ok() };
-    let found = number.and_then(|n| T::try_from(n).ok()).filter(|n| (least..=most).contains(n));
+    let found = as_number::<u64>(value).and_then(|n| T::try_from(n).ok()).filter(|n| (least..=most).contains(n));
     found.ok_or_else(|| refusal(name, &format!("a whole number from {least} to {most}{unit}"), value))
 }
 

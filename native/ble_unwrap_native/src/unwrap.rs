@@ -2,7 +2,7 @@
 
 use ble_unwrap_core::MeshInput;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyType};
 
 use crate::arrays::{self, Argument};
 use crate::errors::Failure;
@@ -30,6 +30,18 @@ pub(crate) struct Atlas {
 
 #[pymethods]
 impl Atlas {
+    #[new]
+    #[pyo3(signature = (uv, chart, report, /))]
+    fn new(uv: Py<Array>, chart: Py<Array>, report: Py<PyDict>) -> Self {
+        Self { uv, chart, report }
+    }
+
+    /// For `pickle` and `copy`.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (Py<Array>, Py<Array>, Py<PyDict>)) {
+        let (py, of) = (slf.py(), slf.get());
+        (slf.get_type(), (of.uv.clone_ref(py), of.chart.clone_ref(py), of.report.clone_ref(py)))
+    }
+
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let report = self.report.bind(py);
         let of = |key| report.get_item(key).map(|value| value.map_or_else(String::new, |value| value.to_string()));
@@ -176,7 +188,7 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 ///     Most iterations of that.
 /// margin : float
 ///     Least distance between charts, in texels of ``texture_size``.
-/// texture_size : int or (int, int)
+/// texture_size : int or two ints
 ///     Width and height of the texture in texels. UVs of a texture that is not square are stretched to the unit square.
 /// rotation : {"any", "quarter", "none"}
 ///     How charts may be turned in packing.
@@ -200,6 +212,8 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 ///     are checked first.
 /// InvalidMeshError
 ///     If indices or offsets do not make a mesh. The text names the first wrong element.
+/// OutOfMemoryError
+///     If there is not enough memory. The result never depends on how much there is.
 /// InternalError
 ///     If the library is at fault.
 ///

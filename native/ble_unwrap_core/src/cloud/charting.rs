@@ -127,7 +127,7 @@ pub(super) fn split(
     let graph = subgraph(&sample.graph, nodes, &mut vec![u32::MAX; sample.len()]);
     let count = settings.geodesics.landmark_count(nodes.len());
     let distances = landmark_distances(&graph, count, progress)?;
-    let parts = split::spectral_parts(&graph, &distances, &SpectralAnalysis::new(&distances));
+    let parts = split::spectral_parts(&graph, &distances, &SpectralAnalysis::new(&distances)?)?;
     let parts = parts.unwrap_or_else(|| split::halves(&graph));
     Ok(parts.into_iter().map(|part| part.into_iter().map(|v| nodes[v as usize]).collect()).collect())
 }
@@ -151,7 +151,7 @@ fn step(
             return Ok(Step::Accept(chart, history));
         }
         Outcome::Split(distances, analysis) if part.splits < MOST_SPECTRAL_SPLITS => {
-            match split::spectral_parts(&own.graph, &distances, &analysis) {
+            match split::spectral_parts(&own.graph, &distances, &analysis)? {
                 Some(parts) => (parts, "split"),
                 None => (split::halves(&own.graph), "halve"),
             }

@@ -64,7 +64,7 @@ pub(super) fn flatten(
         return Ok(Outcome::Flat(project(sample, [along, across], "projection")));
     }
     let distances = landmark_distances(&sample.graph, settings.geodesics.landmark_count(sample.len()), progress)?;
-    let analysis = SpectralAnalysis::new(&distances);
+    let analysis = SpectralAnalysis::new(&distances)?;
     if analysis.planarity < LEAST_PLANARITY {
         return Ok(Outcome::Split(distances, analysis));
     }

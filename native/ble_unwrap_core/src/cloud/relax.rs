@@ -14,7 +14,7 @@ use nalgebra::{Matrix2, Point2, Vector2};
 use rayon::prelude::*;
 
 use crate::distortion;
-use crate::linalg::{SparseCholesky, SparsePattern};
+use crate::linalg::{SparseCholesky, SparseError, SparsePattern};
 use crate::progress::{Cancelled, Progress};
 
 use super::local_map::Offsets;
@@ -60,10 +60,19 @@ pub(super) fn relax(
     spokes.dirichlet_steps(area, uv, progress)
 }
 
+/// A solver for a pattern; `None` where it is beyond one.
+fn solver(pattern: SparsePattern) -> Result<Option<SparseCholesky>, Cancelled> {
+    match SparseCholesky::analyse(pattern) {
+        Ok(system) => Ok(Some(system)),
+        Err(SparseError::OutOfMemory(error)) => Err(Cancelled::OutOfMemory(error)),
+        Err(_) => Ok(None),
+    }
+}
+
 impl Spokes<'_> {
     fn rigid_steps(&self, uv: &mut Vec<Point2<f64>>, progress: &Progress) -> Result<(), Cancelled> {
         let n = self.offsets.len();
-        let Ok(mut system) = SparseCholesky::analyse(self.pattern()) else { return Ok(()) };
+        let Some(mut system) = solver(self.pattern())? else { return Ok(()) };
         let mut values = vec![0.0; system.pattern().entry_count()];
         for i in 0..n {
             for (j, _) in self.offsets.around(i) {
@@ -123,7 +132,7 @@ impl Spokes<'_> {
         if !energy.is_finite() {
             return Ok(());
         }
-        let Ok(mut system) = SparseCholesky::analyse(self.pattern().with_blocks_of_two()) else { return Ok(()) };
+        let Some(mut system) = solver(self.pattern().with_blocks_of_two())? else { return Ok(()) };
         let floor = 4.0 * area.iter().sum::<f64>();
         let blocks = BlockPlaces::new(self.offsets, system.pattern());
         for _ in 0..DIRICHLET_STEPS {

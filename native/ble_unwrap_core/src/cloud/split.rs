@@ -7,6 +7,7 @@ use std::collections::VecDeque;
 
 use crate::geodesics::{LandmarkDistances, WeightedGraph};
 use crate::mesh::VertexId;
+use crate::progress::Cancelled;
 use crate::segmentation::SpectralAnalysis;
 
 /// Parts of fewer nodes, or of less than this share of the chart, go to a neighbour.
@@ -25,19 +26,19 @@ pub(super) fn spectral_parts(
     graph: &WeightedGraph,
     distances: &LandmarkDistances,
     analysis: &SpectralAnalysis,
-) -> Option<Vec<Vec<u32>>> {
+) -> Result<Option<Vec<Vec<u32>>>, Cancelled> {
     let mut best: Option<(f64, [usize; 2])> = None;
     for d in 0..analysis.eigenvalues.len().min(MOST_DIMENSIONS) {
         let Some(ends) = ends(distances, analysis, d) else { continue };
-        let bent = bent_share(distances, ends);
+        let bent = bent_share(distances, ends)?;
         if best.is_none_or(|(least, _)| bent < least * CLEARLY) {
             best = Some((bent, ends));
         }
     }
-    let [first, second] = best?.1;
+    let Some((_, [first, second])) = best else { return Ok(None) };
     let (a, b) = (distances.row(first), distances.row(second));
     let label: Vec<u32> = a.iter().zip(b).map(|(a, b)| u32::from(b < a)).collect();
-    parts_of(graph, label)
+    Ok(parts_of(graph, label))
 }
 
 /// Halves a chart in breadth-first order from one end: each part has fewer nodes, and together they have all. The
@@ -63,7 +64,7 @@ fn ends(distances: &LandmarkDistances, analysis: &SpectralAnalysis, dimension: u
 }
 
 /// How much of the landmarks' energy lies outside a plane once they are parted by the nearer of two of them.
-fn bent_share(distances: &LandmarkDistances, ends: [usize; 2]) -> f64 {
+fn bent_share(distances: &LandmarkDistances, ends: [usize; 2]) -> Result<f64, Cancelled> {
     let at = |end: usize, l: usize| distances.get(ends[end], distances.landmarks()[l]);
     let mut bent = 0.0;
     for side in [false, true] {
@@ -72,9 +73,9 @@ fn bent_share(distances: &LandmarkDistances, ends: [usize; 2]) -> f64 {
         // The part's landmarks as a cloud of their own: their rows, cut down to their columns.
         let rows = part.iter().flat_map(|&l| ids.iter().map(move |&v| distances.get(l, v) as f32)).collect();
         let own = LandmarkDistances::new((0..ids.len()).map(VertexId::new).collect(), ids.len(), rows);
-        bent += part.len() as f64 * (1.0 - SpectralAnalysis::new(&own).planarity);
+        bent += part.len() as f64 * (1.0 - SpectralAnalysis::new(&own)?.planarity);
     }
-    bent / distances.len().max(1) as f64
+    Ok(bent / distances.len().max(1) as f64)
 }
 
 /// Connected parts of equal label, fragments joined to a neighbour; `None` if only one is left.
@@ -178,7 +179,8 @@ mod tests {
         let rows = crate::geodesics::graph_distances(&graph, &landmarks, &Progress::new()).expect("not cancelled");
         let ids = landmarks.iter().map(|&l| VertexId::new(l)).collect();
         let distances = LandmarkDistances::new(ids, 180, rows.iter().map(|&d| d as f32).collect());
-        let parts = spectral_parts(&graph, &distances, &SpectralAnalysis::new(&distances)).expect("two parts");
+        let parts = spectral_parts(&graph, &distances, &SpectralAnalysis::new(&distances).expect("memory"));
+        let parts = parts.expect("memory").expect("two parts");
         covers(&parts, 180);
         assert_eq!(parts.len(), 2);
         assert!(parts.iter().all(|p| p.len() > 70), "{:?}", parts.iter().map(Vec::len).collect::<Vec<_>>());

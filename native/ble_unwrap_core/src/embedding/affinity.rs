@@ -6,6 +6,7 @@ use crate::progress::Progress;
 
 use super::EmbeddingError;
 use super::logistic::{logistic, logistic_pair};
+use super::source::square_matrix;
 
 /// How affinity falls with distance d, for a kernel width σ in units of squared distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,7 +132,7 @@ impl Affinity {
                 }
             }
         }
-        let mut values = vec![0.0; n * n];
+        let mut values = square_matrix(n)?;
         for i in 0..n {
             for j in (0..n).filter(|j| *j != i) {
                 values[i * n + j] = 0.5 * (matrix[i * n + j] + matrix[j * n + i]);

@@ -480,7 +480,7 @@ mod tests {
         progress.cancel();
         assert_eq!(
             fit(&affinity, 2, &start, &[], &options, &progress).err(),
-            Some(EmbeddingError::Cancelled(Cancelled))
+            Some(EmbeddingError::Cancelled(Cancelled::OnRequest))
         );
     }
 }

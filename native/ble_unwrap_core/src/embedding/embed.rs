@@ -177,7 +177,7 @@ impl Task<'_> {
             _ => {}
         }
         let reference = source.reference(&points, self.progress)?;
-        let mut among = source.among(&points, &reference);
+        let mut among = source.among(&points, &reference)?;
         if self.settings.model == Model::Isomap {
             self.to_distances(source, &mut among);
             return self.isomap(source, points, &among, Some(reference));
@@ -203,7 +203,7 @@ impl Task<'_> {
         }
         let landmarks = source.farthest_order(START_LANDMARKS, self.progress)?;
         let seen = source.reference(&landmarks, self.progress)?;
-        let among = source.among(&landmarks, &seen);
+        let among = source.among(&landmarks, &seen)?;
         let sigma = source.landmark_width(&landmarks, &seen, &among, self.kernel, self.width, self.progress)?;
         let threshold = Threshold { kernel: self.kernel, sigma, least: self.options.truncation };
         let (Truncated { affinity, distances }, _) = match source {

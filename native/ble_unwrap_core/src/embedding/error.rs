@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::linalg::EigenError;
+use crate::memory;
 use crate::mesh::VertexId;
 use crate::progress::Cancelled;
 
@@ -137,7 +138,10 @@ pub enum EmbeddingError {
         enough: Option<usize>,
     },
     /// The matrix of all pairs does not fit in memory.
-    #[error("the {points} x {points} matrix of all pairs does not fit in memory; embed by landmarks (100 or so)")]
+    #[error(
+        "the {points} x {points} matrix of all pairs takes {} and does not fit in memory; embed by landmarks (100 or so)",
+        memory::text((*points as u64).saturating_pow(2).saturating_mul(8))
+    )]
     TooManyPoints {
         /// Number of points.
         points: usize,

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use crate::geodesics::{
     DijkstraScratch, WeightedGraph, connectivity, dijkstra, farthest_nodes, graph_distances, knn_graph, nearest_points,
 };
+use crate::memory;
 use crate::progress::Cancelled;
 use crate::progress::Progress;
 
@@ -105,15 +106,18 @@ impl<'a> Source<'a> {
     }
 
     /// The squared distances, or affinities, among landmarks: a symmetric k×k matrix.
-    pub(super) fn among(&self, landmarks: &[usize], reference: &Reference) -> Vec<f64> {
+    ///
+    /// # Errors
+    /// [`EmbeddingError::TooManyPoints`].
+    pub(super) fn among(&self, landmarks: &[usize], reference: &Reference) -> Result<Vec<f64>, EmbeddingError> {
         let k = landmarks.len();
-        let mut matrix = vec![0.0; k * k];
+        let mut matrix = square_matrix(k)?;
         matrix.par_chunks_mut(k.max(1)).zip(landmarks).enumerate().for_each(|(l, (row, &i))| {
             self.observe(reference, i, row);
             row[l] = 0.0;
         });
         symmetrise(&mut matrix, k);
-        matrix
+        Ok(matrix)
     }
 
     /// At most `count` points in farthest-point order: each as far from all before it as any point, ties to the lower
@@ -172,9 +176,9 @@ impl<'a> Source<'a> {
             }
             Self::Graph { n, p, data, neighbours, graph } => {
                 let k = landmarks.len();
-                let mut to_landmarks = Vec::new();
-                let rows = n.checked_mul(k).filter(|len| to_landmarks.try_reserve_exact(*len).is_ok());
-                to_landmarks.resize(rows.ok_or(EmbeddingError::TooManyPoints { points: *n })?, 0.0_f32);
+                let room = n.checked_mul(k).and_then(|count| memory::required(count).ok());
+                let mut to_landmarks: Vec<f32> = room.ok_or(EmbeddingError::TooManyPoints { points: *n })?;
+                to_landmarks.resize(n * k, 0.0);
                 // A few rows at a time, so that double precision never holds them all.
                 let group = 2 * rayon::current_num_threads().max(4);
                 for (g, sources) in landmarks.chunks(group).enumerate() {
@@ -390,8 +394,8 @@ fn transpose(data: &[f64], p: usize, chosen: impl Iterator<Item = usize> + Clone
 
 /// An n×n matrix of zeros, if there is room.
 pub(super) fn square_matrix(n: usize) -> Result<Vec<f64>, EmbeddingError> {
-    let mut matrix = Vec::new();
-    let len = n.checked_mul(n).filter(|len| matrix.try_reserve_exact(*len).is_ok());
-    matrix.resize(len.ok_or(EmbeddingError::TooManyPoints { points: n })?, 0.0);
+    let room = n.checked_mul(n).and_then(|count| memory::required(count).ok());
+    let mut matrix: Vec<f64> = room.ok_or(EmbeddingError::TooManyPoints { points: n })?;
+    matrix.resize(n * n, 0.0);
     Ok(matrix)
 }

@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 
 use crate::geodesics::{DijkstraScratch, WeightedGraph, dijkstra_within};
+use crate::memory;
 use crate::progress::Cancelled;
 use crate::progress::Progress;
 
@@ -53,8 +54,7 @@ pub(super) fn along_graph(
     let n = graph.node_count();
     let radius = threshold.squared_radius().sqrt();
     let mut matrix = square_matrix(n)?;
-    let mut distances = Vec::new();
-    distances.try_reserve_exact(n * n).map_err(|_| EmbeddingError::TooManyPoints { points: n })?;
+    let mut distances = memory::required(n * n).map_err(|_| EmbeddingError::TooManyPoints { points: n })?;
     distances.resize(n * n, f32::INFINITY);
     let work: Vec<usize> = matrix
         .par_chunks_mut(n.max(1))

@@ -200,6 +200,6 @@ mod tests {
         let cancelled = Progress::new();
         cancelled.cancel();
         let lonely = WeightedGraph::from_edges(2, []);
-        assert_eq!(shortest_bridges(&lonely, &[0.0, 1.0], 1, &cancelled), Err(Cancelled));
+        assert_eq!(shortest_bridges(&lonely, &[0.0, 1.0], 1, &cancelled), Err(Cancelled::OnRequest));
     }
 }

@@ -234,7 +234,7 @@ mod tests {
         assert_eq!(graph_distances(&graph, &[9], &Progress::new()).expect("not cancelled"), [f64::INFINITY; 3]);
         let cancelled = Progress::new();
         cancelled.cancel();
-        assert_eq!(graph_distances(&graph, &[0], &cancelled), Err(Cancelled));
+        assert_eq!(graph_distances(&graph, &[0], &cancelled), Err(Cancelled::OnRequest));
     }
 
     #[test]

@@ -58,6 +58,6 @@ mod tests {
         assert_eq!(chosen, [1, 2, 0, 3]);
         let progress = Progress::new();
         progress.cancel();
-        assert_eq!(farthest_nodes(&graph, 9, 1, &progress), Err(Cancelled));
+        assert_eq!(farthest_nodes(&graph, 9, 1, &progress), Err(Cancelled::OnRequest));
     }
 }

@@ -9,6 +9,7 @@ use super::landmark_distances::LandmarkDistances;
 use super::min_heap::MinHeap;
 use super::settings::{GeodesicSettings, Metric};
 use super::weighted_graph::WeightedGraph;
+use crate::memory;
 use crate::mesh::{TriMesh, VertexId, measure};
 use crate::progress::{Cancelled, Progress};
 
@@ -102,7 +103,7 @@ fn middle_vertex(mesh: &TriMesh) -> VertexId {
 /// a vertex and source (fast marching); memory: the result, and 30 bytes a vertex and thread.
 ///
 /// # Errors
-/// [`Cancelled`] if `progress` says so.
+/// [`Cancelled`] if `progress` says so, or there is no memory for the rows.
 pub fn geodesic_distances(
     mesh: &TriMesh,
     sources: &[VertexId],
@@ -110,7 +111,8 @@ pub fn geodesic_distances(
     progress: &Progress,
 ) -> Result<LandmarkDistances, Cancelled> {
     let n = mesh.vertex_count();
-    let mut rows = vec![f32::INFINITY; n * sources.len()];
+    // As many as the caller likes: too many for the memory is an error, and a product that overflows is too many.
+    let mut rows = memory::filled(n.saturating_mul(sources.len()), f32::INFINITY).map_err(Cancelled::OutOfMemory)?;
     if rows.is_empty() {
         return Ok(LandmarkDistances::new(sources.to_vec(), n, rows));
     }

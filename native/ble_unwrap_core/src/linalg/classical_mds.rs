@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::krylov::{LANES, block_width, leading_of_operator, pays};
 use super::symmetric::{EigenError, Eigenpairs, leading_eigenpairs};
+use crate::memory;
 use crate::progress::Progress;
 
 /// A coordinate is kept only where its eigenvalue exceeds this share of the largest: below it
@@ -113,7 +114,7 @@ pub fn classical_mds(squared: &[f64], k: usize, keep: usize) -> Result<Mds, Eige
     }
     let mean: Vec<f64> = squared.chunks_exact(k).map(|row| row.iter().sum::<f64>() / k as f64).collect();
     let grand = mean.iter().sum::<f64>() / k as f64;
-    let mut b = vec![0.0; k * k];
+    let mut b = memory::filled(k * k, 0.0)?;
     for i in 0..k {
         for j in 0..k {
             b[i * k + j] = -0.5 * (squared[i * k + j] - mean[i] - mean[j] + grand);

@@ -5,12 +5,14 @@
 
 mod classical_mds;
 mod krylov;
+mod packing_buffers;
 mod sparse;
 mod sparse_pattern;
 mod symmetric;
 mod vector_state;
 
 pub use classical_mds::{Mds, classical_mds, leading_mds};
+pub use packing_buffers::bytes_of_packing_buffers;
 pub use sparse::{RoughCholesky, SparseCholesky, SparseError};
 pub use sparse_pattern::SparsePattern;
 pub use symmetric::{EigenError, Eigenpairs, leading_eigenpairs};

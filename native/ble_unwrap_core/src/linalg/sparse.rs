@@ -13,8 +13,10 @@ use faer::traits::RealField;
 use faer::{Conj, MatMut, Par, Side, Spec};
 use thiserror::Error;
 
+use super::packing_buffers;
 use super::sparse_pattern::SparsePattern;
 use super::vector_state::restore_vector_state;
+use crate::memory::{self, OutOfMemory};
 
 /// Why a sparse system could not be factored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
@@ -26,9 +28,12 @@ pub enum SparseError {
         /// The row of the pivot, in the order of the caller.
         row: usize,
     },
-    /// The factor does not fit in memory, or has more than 2³¹ entries.
-    #[error("the sparse factor is too large")]
+    /// The factor has more than 2³¹ entries, whatever the memory.
+    #[error("the sparse factor has too many entries")]
     TooLarge,
+    /// There is no memory for the factor.
+    #[error(transparent)]
+    OutOfMemory(#[from] OutOfMemory),
 }
 
 /// Most right-hand sides solved at once.
@@ -57,7 +62,7 @@ impl SparseCholesky {
     /// [`SparseCholesky::refactor`] succeeds.
     ///
     /// # Errors
-    /// [`SparseError::TooLarge`].
+    /// [`SparseError::TooLarge`], [`SparseError::OutOfMemory`].
     pub fn analyse(pattern: SparsePattern) -> Result<Self, SparseError> {
         let factor = Factor::analyse(&pattern, Order::of(&pattern)?)?;
         let scratch = buffer(factor.refactor_scratch().or(factor.solve_scratch()))?;
@@ -109,7 +114,7 @@ impl RoughCholesky {
     /// Orders the blocks and finds the pattern of the factor.
     ///
     /// # Errors
-    /// [`SparseError::TooLarge`].
+    /// [`SparseError::TooLarge`], [`SparseError::OutOfMemory`].
     pub fn analyse(blocks: SparsePattern) -> Result<Self, SparseError> {
         let (pattern, order) = (blocks.with_blocks_of_two(), Order::of(&blocks)?.with_blocks_of_two());
         drop(blocks);
@@ -200,7 +205,17 @@ impl RoughCholesky {
 }
 
 fn buffer(size: StackReq) -> Result<MemBuffer, SparseError> {
-    MemBuffer::try_new(size).map_err(|_| SparseError::TooLarge)
+    let bytes = size.size_bytes() as u64;
+    MemBuffer::try_new(size).map_err(|_| OutOfMemory::Refused { bytes }.into())
+}
+
+/// An error of faer's analysis of so many entries.
+fn analysis_error(error: FaerError, entries: usize) -> SparseError {
+    match error {
+        // faer does not say what it asked for: an index an entry, at least.
+        FaerError::OutOfMemory => OutOfMemory::Refused { bytes: 4 * entries as u64 }.into(),
+        _ => SparseError::TooLarge,
+    }
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -221,7 +236,7 @@ impl Order {
         let mut scratch = buffer(amd::order_maybe_unsorted_scratch::<u32>(n, pattern.entry_count()))?;
         let stack = MemStack::new(&mut scratch);
         amd::order_maybe_unsorted(&mut forward, &mut inverse, pattern.symbolic(), amd::Control::default(), stack)
-            .map_err(|_: FaerError| SparseError::TooLarge)?;
+            .map_err(|error| analysis_error(error, pattern.entry_count()))?;
         Ok(Self { forward, inverse })
     }
 
@@ -248,12 +263,12 @@ impl<T: RealField + Copy + Default> Factor<T> {
         let permutation = PermRef::new_checked(&order.forward, &order.inverse, pattern.size());
         let ordering = SymmetricOrdering::Custom(permutation);
         let symbolic = factorize_symbolic_cholesky(pattern.symbolic(), Side::Upper, ordering, params)
-            .map_err(|_: FaerError| SparseError::TooLarge)?;
+            .map_err(|error| analysis_error(error, pattern.entry_count()))?;
         // The analysis has a copy.
         drop(order);
-        let mut values = Vec::new();
-        values.try_reserve_exact(symbolic.len_val()).map_err(|_| SparseError::TooLarge)?;
-        values.resize(symbolic.len_val(), T::default());
+        // Before the first product of this thread.
+        packing_buffers::reserve()?;
+        let values = memory::filled(symbolic.len_val(), T::default())?;
         Ok(Self { symbolic, values })
     }
 

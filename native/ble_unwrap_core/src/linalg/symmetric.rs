@@ -5,7 +5,9 @@ use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_
 use faer::{Mat, MatRef, Par};
 use thiserror::Error;
 
+use super::packing_buffers;
 use super::vector_state::restore_vector_state;
+use crate::memory::OutOfMemory;
 use crate::progress::Cancelled;
 
 /// Why a symmetric matrix has no eigenpairs to give.
@@ -22,9 +24,15 @@ pub enum EigenError {
     /// The QR iteration gave up; does not happen for matrices of sane scale.
     #[error("the symmetric eigenvalue iteration did not converge")]
     NoConvergence,
-    /// Asked to stop.
+    /// Asked to stop, or out of memory.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl From<OutOfMemory> for EigenError {
+    fn from(error: OutOfMemory) -> Self {
+        Self::Cancelled(Cancelled::OutOfMemory(error))
+    }
 }
 
 /// The eigenvalues of a symmetric matrix and the eigenvectors of the largest.
@@ -43,7 +51,8 @@ pub struct Eigenpairs {
 /// of equal eigenvalues are an arbitrary basis of their space. O(n³), about 4 ms for n = 100.
 ///
 /// # Errors
-/// [`EigenError::NotFinite`] names an entry; [`EigenError::NoConvergence`].
+/// [`EigenError::NotFinite`] names an entry; [`EigenError::NoConvergence`]; [`EigenError::Cancelled`] where there is no
+/// memory.
 ///
 /// # Panics
 /// If `matrix` does not hold n² values.
@@ -61,12 +70,15 @@ pub fn leading_eigenpairs(matrix: &[f64], n: usize, count: usize) -> Result<Eige
     let mut vectors = Mat::<f64>::zeros(n, n);
     let mut values = faer::diag::Diag::<f64>::zeros(n);
     let scratch = self_adjoint_evd_scratch::<f64>(n, ComputeEigenvectors::Yes, Par::Seq, faer::prelude::default());
+    let bytes = scratch.size_bytes() as u64;
+    let mut scratch = MemBuffer::try_new(scratch).map_err(|_| OutOfMemory::Refused { bytes })?;
+    packing_buffers::reserve()?;
     let outcome = self_adjoint_evd(
         MatRef::from_row_major_slice(matrix, n, n),
         values.as_mut(),
         Some(vectors.as_mut()),
         Par::Seq,
-        MemStack::new(&mut MemBuffer::new(scratch)),
+        MemStack::new(&mut scratch),
         faer::prelude::default(),
     );
     restore_vector_state();

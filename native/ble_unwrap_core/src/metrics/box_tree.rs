@@ -213,8 +213,11 @@ pub(crate) fn in_batches<S: Sync, R: Send>(
         let seen: &S = state;
         let results: Vec<R> = (start..(start + BATCH).min(chunks))
             .into_par_iter()
-            .map(|c| work(c * CHUNK..((c + 1) * CHUNK).min(n), seen))
-            .collect();
+            .map(|c| {
+                progress.check()?;
+                Ok(work(c * CHUNK..((c + 1) * CHUNK).min(n), seen))
+            })
+            .collect::<Result<_, Cancelled>>()?;
         let mut go_on = true;
         for r in results {
             go_on &= fold(state, r);

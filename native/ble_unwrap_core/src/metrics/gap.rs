@@ -182,6 +182,6 @@ mod tests {
         assert_eq!(least_gap(&[], 8.0, &Progress::new()), Ok((8.0, true)));
         let p = Progress::new();
         p.cancel();
-        assert_eq!(least_gap(&random_segments(20, 2, 4.0, 1), 8.0, &p), Err(Cancelled));
+        assert_eq!(least_gap(&random_segments(20, 2, 4.0, 1), 8.0, &p), Err(Cancelled::OnRequest));
     }
 }

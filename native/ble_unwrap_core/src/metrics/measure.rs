@@ -19,8 +19,10 @@ use super::uv_topology::{NONE, UvTopology};
 pub(crate) const DEGENERATE: f64 = 1e-7;
 /// Share of the layout's box that two triangles must have in common to count as an overlap.
 const OVERLAP_SHARE: f64 = 1e-9;
-/// Charts with less of the surface than this do not compete for the worst stretch.
+/// Charts with less of the surface than this do not compete for the worst stretch,
 const SPECK: f64 = 1e-4;
+/// unless even the largest chart is so small: then those do that have at least this share of its area.
+const SPECK_AMONG_SMALL: f64 = 1e-2;
 /// How far outside the unit square coordinates may lie before the layout counts as out of range.
 const RANGE_SLACK: f64 = 1e-5;
 
@@ -62,7 +64,8 @@ pub struct Measures {
     pub l2: f64,
     /// L2 stretch with every chart at its own best scale.
     pub l2_chart_scale: f64,
-    /// L2 stretch of the worst chart at its best scale, charts under 1e-4 of the surface aside.
+    /// L2 stretch of the worst chart at its best scale, charts under 1e-4 of the surface aside (under a hundredth of the
+    /// largest, where that has less than a hundredth of the surface).
     pub l2_worst_chart: f64,
     /// Label of the lowest triangle of that chart.
     pub worst_chart: Option<i32>,
@@ -337,7 +340,9 @@ fn stretch(out: &mut Measures, mesh: &UvMesh, faces: &[FaceMeasures], topology: 
     let density = all.uv_area / all.area;
     out.l2 = l2(&all);
     out.l2_chart_scale = chart.iter().map(|s| (s.energy * s.uv_area).sqrt()).sum::<f64>() / all.area;
-    for c in out.per_chart.iter().filter(|c| c.area_share > SPECK) {
+    let largest_chart = out.per_chart.iter().map(|c| c.area_share).fold(0.0, f64::max);
+    let speck = SPECK.min(SPECK_AMONG_SMALL * largest_chart);
+    for c in out.per_chart.iter().filter(|c| c.area_share > speck) {
         if out.l2_worst_chart.is_nan() || c.l2 > out.l2_worst_chart {
             out.l2_worst_chart = c.l2;
             out.worst_chart = Some(c.label);

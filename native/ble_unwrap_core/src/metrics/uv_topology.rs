@@ -1,5 +1,7 @@
 //! Charts, islands, seams and boundary edges of a layout, from nothing but vertices and UVs.
 
+use std::cmp::Ordering;
+
 use nalgebra::Point3;
 
 use super::uv_mesh::UvMesh;
@@ -44,7 +46,11 @@ impl UvTopology {
         let uv_ends = |h: u32| {
             let h = h as usize;
             let (a, b) = (uv_vertex[h / 3][h % 3], uv_vertex[h / 3][(h % 3 + 1) % 3]);
-            let forward = ends(h).0 < ends(h).1;
+            // An edge from a vertex to itself, as a face has it that uses a vertex twice, has a direction in the layout only.
+            let forward = match ends(h).0.cmp(&ends(h).1) {
+                Ordering::Equal => a < b,
+                order => order == Ordering::Less,
+            };
             if forward { (a, b, forward) } else { (b, a, forward) }
         };
         let mut sorted = Vec::new();
@@ -275,6 +281,16 @@ mod tests {
         assert_eq!((t.chart_count, t.island_count), (2, 1));
         assert!((t.seam_length - 10f64.sqrt()).abs() < 1e-15);
         assert_eq!(t.boundary.len(), 6);
+    }
+
+    #[test]
+    fn a_triangle_is_joined_over_an_edge_from_a_vertex_to_itself() {
+        // A pentagon 0 1 2 0 3, fanned from its first corner: its second diagonal leads from vertex 0 to vertex 0.
+        let uv = [[0.0, 0.0], [1.0, 0.0], [2.0, 1.0], [1.0, 2.0], [0.0, 1.0]];
+        let corners = [[0, 1, 2], [0, 2, 3], [0, 3, 4]];
+        let t = topology(&[[0, 1, 2], [0, 2, 0], [0, 0, 3]], &uv, &corners);
+        assert_eq!((t.chart_count, t.boundary.len()), (1, 5));
+        assert_eq!(t.against, [false; 3]);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::search::{Best, Search};
 use super::shape::SAFETY_TEXELS;
 use super::sketch::{growth, most_promising};
 use super::{PackError, PackSettings, Quality, Rotation};
-use crate::progress::Progress;
+use crate::progress::{Cancelled, Progress};
 
 /// So many of the largest charts are tried in more angles than one: about so many in all, at least and at
 /// most so many a chart. Quarter turns of each come for free.
@@ -89,7 +89,7 @@ pub(super) fn densest(
     }
     let largest = outlines.iter().map(|o| o.extent).fold(0.0, f64::max);
     let area = |i: usize| outlines[i].area * (outlines[i].extent / largest).powi(2);
-    let turns = turns(outlines, &(0..n).map(area).collect::<Vec<_>>(), grid, settings);
+    let turns = turns(outlines, &(0..n).map(area).collect::<Vec<_>>(), grid, settings, progress)?;
     let fine = Search {
         outlines,
         turns: &turns,
@@ -117,7 +117,11 @@ pub(super) fn densest(
     for effort in Effort::new(n, settings.quality) {
         let coarse = Grid::coarse(settings, (effort.across * (n as f64).sqrt()).clamp(effort.least, effort.most));
         let lattice = |o: &Outline| (COARSENED * coarse.cell / (guess * o.extent)).clamp(1e-6, 0.1);
-        let simple: Vec<Outline> = outlines.par_iter().map(|o| o.coarsened(lattice(o))).collect();
+        let simple = |o: &Outline| {
+            progress.check()?;
+            Ok(o.coarsened(lattice(o)))
+        };
+        let simple: Vec<Outline> = outlines.par_iter().map(simple).collect::<Result<_, Cancelled>>()?;
         let search = Search {
             outlines: &simple,
             grid: coarse,
@@ -152,7 +156,13 @@ pub(super) fn densest(
 }
 
 /// Base angles to try, by chart; `areas` tell which are large.
-fn turns(outlines: &[Outline], areas: &[f64], grid: Grid, settings: &PackSettings) -> Vec<Vec<[f64; 2]>> {
+fn turns(
+    outlines: &[Outline],
+    areas: &[f64],
+    grid: Grid,
+    settings: &PackSettings,
+    progress: &Progress,
+) -> Result<Vec<Vec<[f64; 2]>>, Cancelled> {
     let n = outlines.len();
     let mut by_area: Vec<usize> = (0..n).collect();
     by_area.sort_by(|&a, &b| areas[b].total_cmp(&areas[a]).then(a.cmp(&b)));
@@ -160,10 +170,13 @@ fn turns(outlines: &[Outline], areas: &[f64], grid: Grid, settings: &PackSetting
     for &i in by_area.iter().take(LARGE) {
         angles[i] = ANGLES.div_ceil(n).clamp(LEAST_ANGLES, MOST_ANGLES);
     }
-    let turns = |i: usize| match settings.rotation {
-        // The given pose, in the frame of the grid.
-        Rotation::None if grid.sideways => vec![[0.0, 1.0]],
-        rotation => base_turns(&outlines[i], rotation, angles[i]),
+    let turns = |i: usize| {
+        progress.check()?;
+        Ok(match settings.rotation {
+            // The given pose, in the frame of the grid.
+            Rotation::None if grid.sideways => vec![[0.0, 1.0]],
+            rotation => base_turns(&outlines[i], rotation, angles[i]),
+        })
     };
     (0..n).into_par_iter().map(turns).collect()
 }
@@ -192,4 +205,39 @@ fn first_guess(areas: impl Iterator<Item = f64>, settings: &PackSettings, grid: 
     // a s² + 2 b s + c = 0. Without room for the gaps alone, or without area, start small.
     let root = (b * b - a * c).max(0.0).sqrt() - b;
     if root > 0.0 && a > 0.0 { root / a } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packing::PackItem;
+    use nalgebra::Point2;
+
+    #[test]
+    fn every_pass_over_the_charts_can_be_stopped() {
+        let points = [Point2::new(0.0, 0.0), Point2::new(1.0, 0.0), Point2::new(0.0, 1.0)];
+        let item = PackItem { points: &points, triangles: &[[0, 1, 2]] };
+        let outlines: Vec<Outline> = (0..9).map(|i| Outline::new(&item, i).expect("finite")).collect();
+        let settings = PackSettings::default();
+        let grid = Grid::new(&settings, outlines.len()).expect("room");
+        let stopped = Progress::new();
+        stopped.cancel();
+        let pass = |progress: &Progress| turns(&outlines, &[0.5; 9], grid, &settings, progress);
+        assert!(pass(&Progress::new()).is_ok());
+        assert_eq!(pass(&stopped), Err(Cancelled::OnRequest));
+        let turns = pass(&Progress::new()).expect("not cancelled");
+        let search = |progress| Search {
+            outlines: &outlines,
+            turns: &turns,
+            quarters: true,
+            grid,
+            growth: 0.0,
+            reach: Reach::new(0.0),
+            budget: 1,
+            progress,
+        };
+        assert!(search(&stopped).shapes(1.0).is_err());
+        let going = Progress::new();
+        assert_eq!(search(&going).shapes(1.0).map(|shapes| shapes.len()), Ok(9));
+    }
 }

@@ -283,7 +283,10 @@ pub enum PackError {
 pub fn pack(items: &[PackItem<'_>], settings: &PackSettings, progress: &Progress) -> Result<Packed, PackError> {
     settings.check()?;
     progress.check()?;
-    let outline = |(i, item)| Outline::new(item, i);
+    let outline = |(i, item)| {
+        progress.check()?;
+        Outline::new(item, i)
+    };
     let outlines: Vec<Outline> = items.par_iter().enumerate().map(outline).collect::<Result<_, _>>()?;
     let (dense, _) = density::densest(&outlines, settings, progress)?;
     let texels = f64::from(settings.width) * f64::from(settings.height);

@@ -9,7 +9,7 @@ use super::placement::{Dense, Place};
 use super::settle::{Ground, Piece, settle};
 use super::sketch::{Sketch, Spot};
 use super::{PackError, PackSettings};
-use crate::progress::Progress;
+use crate::progress::{Cancelled, Progress};
 
 /// Half the side of the windows charts are looked for in first, in cells of the sketch.
 const WINDOW: f64 = 1.0;
@@ -80,7 +80,7 @@ impl<'a> Refinement<'a> {
         let (mut shrinks, mut growths) = (0, 0);
         loop {
             self.placements += 1;
-            let pieces = self.pieces(&spots, density);
+            let pieces = self.pieces(&spots, density)?;
             let height = self.grid.rows + self.grid.rows / OVERSHOOT;
             let mut ground = Ground::new(self.grid.columns, height, self.reach.clone());
             let centres: Vec<[f64; 2]> = spots.iter().map(|s| s.map_or([0.0; 2], |s| self.cells(s.centre))).collect();
@@ -124,9 +124,10 @@ impl<'a> Refinement<'a> {
         texels.map(|t| (t - self.grid.border) / self.grid.cell)
     }
 
-    fn pieces(&self, spots: &[Option<Spot>], density: f64) -> Vec<Option<Piece>> {
+    fn pieces(&self, spots: &[Option<Spot>], density: f64) -> Result<Vec<Option<Piece>>, Cancelled> {
         let piece = |(outline, spot): (&Outline, &Option<Spot>)| {
-            spot.map(|spot| Piece::new(outline, spot.turn, density, self.grid.cell))
+            self.progress.check()?;
+            Ok(spot.map(|spot| Piece::new(outline, spot.turn, density, self.grid.cell)))
         };
         self.outlines.par_iter().zip(spots).map(piece).collect()
     }

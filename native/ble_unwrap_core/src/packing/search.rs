@@ -16,7 +16,7 @@ use super::outline::Outline;
 use super::place::{Layout, place};
 use super::shape::Shape;
 use super::sketch::Sketch;
-use crate::progress::{Progress, Stage};
+use crate::progress::{Cancelled, Progress, Stage};
 
 /// Attempts in a round while the density is bracketed, when strategies are compared, and in each round
 /// of variations. They run in parallel; fixed, so that results do not depend on the number of threads.
@@ -77,9 +77,11 @@ struct Attempt {
 }
 
 impl Search<'_> {
-    fn shapes(&self, density: f64) -> Vec<Shape> {
+    pub(super) fn shapes(&self, density: f64) -> Result<Vec<Shape>, Cancelled> {
         let shape = |i: usize| {
-            Shape::new(&self.outlines[i], &self.turns[i], self.quarters, density, self.grid.cell, self.growth)
+            self.progress.check()?;
+            let Self { outlines, turns, grid, growth, .. } = self;
+            Ok(Shape::new(&outlines[i], &turns[i], self.quarters, density, grid.cell, *growth))
         };
         (0..self.outlines.len()).into_par_iter().map(shape).collect()
     }
@@ -107,7 +109,7 @@ impl Search<'_> {
     /// # Errors
     /// [`PackError::Cancelled`].
     pub(super) fn once(&self, density: f64) -> Result<Option<Best>, PackError> {
-        let shapes = self.shapes(density);
+        let shapes = self.shapes(density)?;
         let attempt = least(self.attempts(&shapes, Strategy::portfolio(&shapes, 1))?);
         let fits = attempt.filter(|a| a.used <= 1.0);
         Ok(fits.map(|a| Best { shapes, layout: a.layout, density }))
@@ -127,7 +129,7 @@ impl Search<'_> {
         let mut too_dense = f64::INFINITY;
         let mut near = false;
         let (mut step, mut idle, mut shrinks) = (STEP, 0, 0);
-        let mut shapes = self.shapes(density);
+        let mut shapes = self.shapes(density)?;
         while made < self.budget && shrinks < SHRINKS {
             self.progress.advance(Stage::Pack, made as f64 / self.budget as f64);
             let strategies = match &lead {
@@ -179,14 +181,14 @@ impl Search<'_> {
                 too_dense = density;
                 shrinks += 1;
                 density *= (0.998 * loosened).clamp(0.5, 0.995 - 0.01 * f64::from(shrinks.min(9)));
-                shapes = self.shapes(density);
+                shapes = self.shapes(density)?;
                 continue;
             }
             made += count;
             if density == before {
                 break;
             }
-            shapes = self.shapes(density);
+            shapes = self.shapes(density)?;
         }
         Ok(Found { best, sketches, attempts: all_made })
     }

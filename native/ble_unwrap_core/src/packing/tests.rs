@@ -437,7 +437,10 @@ fn errors_say_what_to_do() {
 fn stops_when_cancelled() {
     let progress = Progress::new();
     progress.cancel();
-    assert_eq!(pack(&items(&mixture(9, 1)), &square(64, 1.0), &progress), Err(PackError::Cancelled(Cancelled)));
+    assert_eq!(
+        pack(&items(&mixture(9, 1)), &square(64, 1.0), &progress),
+        Err(PackError::Cancelled(Cancelled::OnRequest))
+    );
 }
 
 #[test]

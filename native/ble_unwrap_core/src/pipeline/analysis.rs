@@ -16,7 +16,7 @@ use crate::settings::{self, ChartScale, LimitOver, Settings};
 
 use super::memo::{self, Fingerprint, Kind, Memo, Run};
 use super::tally::Tally;
-use super::{budget, component, finish, ribbons};
+use super::{budget, component, finish, needs, ribbons};
 use crate::flattening::Rungs;
 
 /// A mesh and what was found out about it, for unwrapping it several times with different settings.
@@ -95,6 +95,7 @@ impl Analysis {
             face_offsets: &self.face_offsets,
             ..MeshInput::default()
         };
+        needs::require(&input, settings)?;
         self.memo.begin();
         self.prepared.unwrap(&input, settings, Clock::new(), &Run::new(progress, Some(&self.memo)))
     }

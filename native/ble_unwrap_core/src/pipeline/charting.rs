@@ -204,7 +204,7 @@ impl<'a> Attempt<'a> {
             return Ok(known);
         }
         let fresh = match self.inherited {
-            Some(distances) => Arc::new((distances.clone(), SpectralAnalysis::new(distances))),
+            Some(distances) => Arc::new((distances.clone(), SpectralAnalysis::new(distances)?)),
             None => analyse(self.patch, self.settings, self.progress)?,
         };
         Ok(self.measured.get_or_init(|| fresh))
@@ -275,7 +275,9 @@ impl<'a> Attempt<'a> {
             }
             let flattened = match flatten::projected(patch, self.settings, rungs, self.progress)? {
                 Some(verdict) => verdict,
-                None if relief.as_ref().is_some_and(|r| !r.is_promising()) => Flattened::Refused,
+                None if relief.as_ref().map_err(|c| *c)?.as_ref().is_some_and(|r| !r.is_promising()) => {
+                    Flattened::Refused
+                }
                 None => {
                     let (distances, analysis) = self.analysis()?;
                     self.flatten(patch, distances, analysis, rungs)?
@@ -283,8 +285,8 @@ impl<'a> Attempt<'a> {
             };
             let chart = match flattened {
                 Flattened::Flat(flat) => return Ok(Some(flat.into_chart(patch.clone()))),
-                Flattened::Near(uv) => self.with_darts((*relief).clone(), uv, rungs)?,
-                Flattened::Refused => self.relieved((*relief).clone(), rungs)?,
+                Flattened::Near(uv) => self.with_darts((*relief).clone()?, uv, rungs)?,
+                Flattened::Refused => self.relieved((*relief).clone()?, rungs)?,
             };
             if chart.is_some() {
                 return Ok(chart);
@@ -295,7 +297,7 @@ impl<'a> Attempt<'a> {
         if blob {
             return match self.net(rungs) {
                 Some(chart) => Ok(Some(chart)),
-                None => self.relieved((*relief).clone(), rungs),
+                None => self.relieved((*relief).clone()?, rungs),
             };
         }
         if self.topology.is_disk() || patch.faces.len() < LEAST_FACES_TO_CUT {
@@ -319,7 +321,7 @@ impl<'a> Attempt<'a> {
         if let Some(flat) = flatten::isometric(&open, rungs) {
             return Ok(Some(flat.into_chart(open)));
         }
-        let relief = self.relief(Cow::Borrowed(&open));
+        let relief = self.relief(Cow::Borrowed(&open))?;
         let is_promising = relief.as_ref().is_none_or(Relief::is_promising);
         let flattened = if is_promising { self.embedded(&open, rungs)? } else { Flattened::Refused };
         match flattened {
@@ -336,8 +338,12 @@ impl<'a> Attempt<'a> {
     }
 
     /// What darts may do for a patch; `None` if none are wanted.
-    fn relief<'p>(&'p self, patch: Cow<'p, Patch>) -> Option<Relief<'p>> {
-        if self.settings.wants_darts() { Relief::of(patch, self.settings.stretch_limit, self.progress) } else { None }
+    fn relief<'p>(&'p self, patch: Cow<'p, Patch>) -> Result<Option<Relief<'p>>, Cancelled> {
+        if self.settings.wants_darts() {
+            Relief::of(patch, self.settings.stretch_limit, self.progress)
+        } else {
+            Ok(None)
+        }
     }
 
     /// A box or the like, unfolded.
@@ -350,13 +356,13 @@ impl<'a> Attempt<'a> {
 
     /// A patch cut by darts where it bulges, before it is flattened.
     fn relieved(&self, relief: Option<Relief<'_>>, rungs: &mut Rungs) -> Result<Option<Chart>, Cancelled> {
-        let Some(open) = relief.and_then(Relief::relieved) else { return Ok(None) };
+        let Some(open) = relief.map(Relief::relieved).transpose()?.flatten() else { return Ok(None) };
         rungs.take(Rung::CutOpen);
         let flat = match flatten::isometric(&open, rungs) {
             Some(flat) => flat,
             None => match self.embedded(&open, rungs)? {
                 Flattened::Flat(flat) => flat,
-                Flattened::Near(uv) => return self.with_darts(self.relief(Cow::Owned(open)), uv, rungs),
+                Flattened::Near(uv) => return self.with_darts(self.relief(Cow::Owned(open))?, uv, rungs),
                 Flattened::Refused => return Ok(None),
             },
         };
@@ -381,7 +387,7 @@ impl<'a> Attempt<'a> {
                 }
                 Flattened::Near(positions) => {
                     uv = positions;
-                    relief = self.relief(Cow::Owned(open));
+                    relief = self.relief(Cow::Owned(open))?;
                 }
                 Flattened::Refused => break,
             }
@@ -420,7 +426,7 @@ fn analyse(
     let bytes = |known: &(LandmarkDistances, SpectralAnalysis)| 4 * known.0.len() * known.0.vertex_count();
     progress.recall(Kind::Analysis, input, bytes, || {
         let distances = crate::geodesics::landmark_distances(&patch.mesh, &geodesics, progress)?;
-        let analysis = SpectralAnalysis::new(&distances);
+        let analysis = SpectralAnalysis::new(&distances)?;
         Ok((distances, analysis))
     })
 }

@@ -14,7 +14,7 @@ use crate::metrics::{self, Texture, UvMesh, UvMeshError};
 use crate::packing::{self, PackItem, Packed};
 use crate::progress::{Cancelled, Stage};
 use crate::report::{Report, counted};
-use crate::rounding::{self, Rounding};
+use crate::rounding::{self, Rounding, RoundingError};
 use crate::segmentation;
 use crate::settings::{ChartScale, LimitOver, Settings};
 use crate::verify::{self, Certificate};
@@ -73,6 +73,12 @@ pub(super) fn finish(
             report.faces = input.face_offsets.len().saturating_sub(1);
             report.unmapped_faces = surface.unmapped.len();
             report.warnings = warnings(surface, &layout, &certificate);
+            if measures.faces > measures.unmapped_faces && measures.l2.is_nan() {
+                report.warnings.push(
+                    "the stretch could not be measured: every triangle is thinner than single precision tells from none"
+                        .into(),
+                );
+            }
             if let Some(&(chart, l2)) = report.charts_over_limit.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
                 report.warnings.push(format!(
                     "{} the stretch limit, the worst is chart {chart} with {l2:.3}",
@@ -200,9 +206,10 @@ impl Layout {
                 Point2::new(texel.x / size[0], texel.y / size[1])
             };
             let exact: Vec<Point2<f64>> = chart.uv.iter().map(place).collect();
-            let uv = match rounding::round_to_f32(&chart.patch.mesh, &exact, &rounding) {
+            let uv = match rounding::round_to_f32(&chart.patch.mesh, &exact, &rounding, progress) {
                 Ok(rounded) => rounded.uv,
-                Err(unmendable) => {
+                Err(RoundingError::Cancelled(cancelled)) => return Err(cancelled.into()),
+                Err(RoundingError::Unmendable(unmendable)) => {
                     let faces = unmendable.faces.iter().map(|f| (number, chart.patch.faces[f.index()]));
                     layout.broken.extend(faces);
                     unmendable.uv

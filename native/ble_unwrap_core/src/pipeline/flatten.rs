@@ -201,6 +201,7 @@ pub(super) fn sewn(
     let trial = Trial::new(patch, settings, progress);
     trial.isometric_or(rungs, |rungs| match stretch::stitch(&patch.mesh, &trial.steps.rest, drawn) {
         Ok(start) => trial.polish_or_not(&start, settings.stretch_limit, Rung::Sewn, rungs),
+        Err(StretchError::Cancelled(c)) => Err(c),
         Err(_) => Ok(Polished::BadStart),
     })
 }

@@ -15,6 +15,7 @@ mod finish;
 mod flatten;
 mod memo;
 mod merge;
+mod needs;
 mod polygon;
 mod prolong;
 mod recut;
@@ -50,10 +51,11 @@ use memo::Run;
 ///
 /// # Errors
 /// [`UnwrapError`]: invalid arrays, a setting out of range, charts that cannot keep the margin at the
-/// texture size, or cancelled. Nothing is produced then.
+/// texture size, not enough memory, or cancelled. Nothing is produced then.
 pub fn unwrap(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -> Result<Atlas, UnwrapError> {
     progress.check()?;
     settings.validate()?;
+    needs::require(input, settings)?;
     let mut clock = Clock::new();
     progress.enter(Stage::Condition);
     let prepared = Prepared::new(input, &settings.conditioning(), progress)?;

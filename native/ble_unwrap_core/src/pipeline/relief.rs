@@ -12,7 +12,8 @@ use nalgebra::Point2;
 use crate::charts::{self, Patch};
 use crate::distortion::RestTriangle;
 use crate::mesh::{HalfedgeId, VertexId};
-use crate::stretch::{self, Bulge};
+use crate::progress::Cancelled;
+use crate::stretch::{self, Bulge, StretchError};
 
 use super::memo::{Kind, Run};
 
@@ -38,11 +39,11 @@ pub(super) struct Relief<'a> {
 
 impl<'a> Relief<'a> {
     /// `None` where that cannot be told.
-    pub(super) fn of(patch: Cow<'a, Patch>, stretch_limit: f64, run: &'a Run<'a>) -> Option<Self> {
+    pub(super) fn of(patch: Cow<'a, Patch>, stretch_limit: f64, run: &'a Run<'a>) -> Result<Option<Self>, Cancelled> {
         Self::new(patch, 1.0 + PROMISING * (stretch_limit - 1.0), run)
     }
 
-    fn new(patch: Cow<'a, Patch>, most: f64, run: &'a Run<'a>) -> Option<Self> {
+    fn new(patch: Cow<'a, Patch>, most: f64, run: &'a Run<'a>) -> Result<Option<Self>, Cancelled> {
         let mesh = &patch.mesh;
         let known = run.recall(
             Kind::Bulge,
@@ -50,8 +51,11 @@ impl<'a> Relief<'a> {
             |_| size_of::<Bulge>(),
             || stretch::bulge(mesh, &RestTriangle::of_mesh(mesh)),
         );
-        let bulge = known.ok()?;
-        Some(Self { patch, bulge, most, run })
+        match known {
+            Ok(bulge) => Ok(Some(Self { patch, bulge, most, run })),
+            Err(StretchError::Cancelled(c)) => Err(c),
+            Err(_) => Ok(None),
+        }
     }
 
     /// Whether the patch may come under the limit as it is.
@@ -61,18 +65,20 @@ impl<'a> Relief<'a> {
 
     /// The patch with as many darts as make it promising; `None` where that takes none, too many, or nothing bulges. Also where
     /// guides run inside it: they say where it is to be cut, and a split goes there.
-    pub(super) fn relieved(self) -> Option<Patch> {
+    pub(super) fn relieved(self) -> Result<Option<Patch>, Cancelled> {
         if is_guided(&self.patch) || self.is_promising() {
-            return None;
+            return Ok(None);
         }
         let mut relief = self;
         for _ in 0..MOST_DARTS {
-            relief = Self::new(Cow::Owned(relief.with_dart()?), relief.most, relief.run)?;
+            let Some(open) = relief.with_dart() else { return Ok(None) };
+            let Some(next) = Self::new(Cow::Owned(open), relief.most, relief.run)? else { return Ok(None) };
+            relief = next;
             if relief.is_promising() {
-                return Some(relief.patch.into_owned());
+                return Ok(Some(relief.patch.into_owned()));
             }
         }
-        None
+        Ok(None)
     }
 
     /// The patch with one dart, and where its vertices are if they stay where they were.
@@ -167,7 +173,7 @@ mod tests {
     fn of<T>(patch: &Patch, stretch_limit: f64, then: impl FnOnce(Relief<'_>) -> T) -> T {
         let progress = Progress::new();
         let run = Run::new(&progress, None);
-        then(Relief::of(Cow::Borrowed(patch), stretch_limit, &run).expect("factored"))
+        then(Relief::of(Cow::Borrowed(patch), stretch_limit, &run).expect("memory").expect("factored"))
     }
 
     #[test]
@@ -175,7 +181,7 @@ mod tests {
         let sheet = test_surfaces::grid(12, 12, [2.0, 2.0], 0.0);
         let cone = whole(moved(&sheet, |p| Point3::new(p.x, p.y, -2.0 * (p.x - 1.0).hypot(p.y - 1.0))));
         assert!(!of(&cone, 1.02, |relief| relief.is_promising()));
-        let open = of(&cone, 1.02, |relief| relief.relieved()).expect("one dart does");
+        let open = of(&cone, 1.02, |relief| relief.relieved().expect("memory")).expect("one dart does");
         assert!(open.mesh.topology().is_disk());
         let seam = 0.5 * (open.mesh.boundary_length() - cone.mesh.boundary_length());
         let side = 5.0_f64.sqrt();
@@ -188,14 +194,17 @@ mod tests {
     #[test]
     fn a_closed_body_is_cut_open_and_a_sheet_left_alone() {
         let long = whole(moved(&test_surfaces::sphere(3), |p| Point3::new(0.2 * p.x, 0.2 * p.y, p.z)));
-        let open =
-            of(&long, 1.1, |relief| relief.relieved()).expect("a spindle is rolled out by a cut from end to end");
+        let open = of(&long, 1.1, |relief| relief.relieved().expect("memory"))
+            .expect("a spindle is rolled out by a cut from end to end");
         assert!(open.mesh.topology().is_disk());
         assert!((measure::total_area(&open.mesh) - long.area()).abs() < 1e-12);
         let sheet = whole(test_surfaces::grid(12, 12, [2.0, 2.0], 0.0));
-        assert!(of(&sheet, 1.1, |flat| flat.is_promising() && flat.relieved().is_none()));
+        assert!(of(&sheet, 1.1, |flat| flat.is_promising() && flat.relieved().expect("memory").is_none()));
         let ball = whole(test_surfaces::sphere(3));
-        assert!(of(&ball, 1.001, |relief| relief.relieved()).is_none(), "no six darts do for that limit");
+        assert!(
+            of(&ball, 1.001, |relief| relief.relieved().expect("memory")).is_none(),
+            "no six darts do for that limit"
+        );
     }
 
     #[test]
@@ -230,7 +239,7 @@ mod tests {
         let sheet = test_surfaces::sheet_with_a_flap();
         let patch = whole(sheet);
         assert!(!of(&patch, 1.1, |relief| relief.is_promising()), "two of its edges join the same vertices");
-        let open = of(&patch, 1.1, |relief| relief.relieved()).expect("one dart does");
+        let open = of(&patch, 1.1, |relief| relief.relieved().expect("memory")).expect("one dart does");
         assert_eq!(stretch::enclosed_vertex(&open.mesh), None);
         let uv: Vec<Point2<f64>> = patch.mesh.positions().iter().map(|p| p.xy()).collect();
         let (opened, start) = without_doubled_edges(patch.clone(), uv);

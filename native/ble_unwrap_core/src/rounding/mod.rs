@@ -12,6 +12,7 @@ use robust::{Coord, orient2d};
 use thiserror::Error;
 
 use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::progress::{Cancelled, Progress};
 
 use kernel::{Constraint, best_point};
 
@@ -66,6 +67,17 @@ pub struct Unmendable {
     pub uv: Vec<[f32; 2]>,
 }
 
+/// Why there is nothing rounded.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum RoundingError {
+    /// The chart is too small for the float32 grid, or had turned triangles (or NaN).
+    #[error(transparent)]
+    Unmendable(Unmendable),
+    /// The computation was broken off.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
 /// Rounds the final UVs of a chart, one for each vertex of `mesh`, to float32 in [0, 1].
 ///
 /// Guaranteed: every triangle of the result is strictly positive by an exact test; vertices whose
@@ -76,11 +88,16 @@ pub struct Unmendable {
 /// O(n) and one pass where nothing breaks; a bounded number of moves otherwise.
 ///
 /// # Errors
-/// [`Unmendable`]: the chart is too small for the float32 grid, or `uv` had turned triangles (or NaN).
+/// [`RoundingError`].
 ///
 /// # Panics
 /// If `uv` does not hold one point a vertex.
-pub fn round_to_f32(mesh: &TriMesh, uv: &[Point2<f64>], rounding: &Rounding) -> Result<Rounded, Unmendable> {
+pub fn round_to_f32(
+    mesh: &TriMesh,
+    uv: &[Point2<f64>],
+    rounding: &Rounding,
+    progress: &Progress,
+) -> Result<Rounded, RoundingError> {
     assert_eq!(uv.len(), mesh.vertex_count(), "one UV a vertex");
     // Adding 0 makes −0 plain.
     let plain: Vec<[f32; 2]> = uv.iter().map(|p| [p.x as f32 + 0.0, p.y as f32 + 0.0]).collect();
@@ -88,12 +105,12 @@ pub fn round_to_f32(mesh: &TriMesh, uv: &[Point2<f64>], rounding: &Rounding) -> 
         Mender { mesh, home: uv, uv: plain.clone(), rounding, goal: Vec::new(), turned: Vec::new(), thin: Vec::new() };
     mender.goal = mesh.faces().map(|f| mender.surface_goal(f)).collect();
     mender.look(mesh.faces());
-    mender.mend();
+    mender.mend(progress)?;
     let moved = mender.uv.iter().zip(&plain).filter(|(a, b)| a != b && !(a[0].is_nan() || a[1].is_nan())).count();
     if mender.turned.is_empty() {
         Ok(Rounded { uv: mender.uv, moved, thin_faces: mender.thin.len() })
     } else {
-        Err(Unmendable { faces: mender.turned, uv: mender.uv })
+        Err(RoundingError::Unmendable(Unmendable { faces: mender.turned, uv: mender.uv }))
     }
 }
 
@@ -139,7 +156,7 @@ impl Mender<'_> {
         self.thin = thin;
     }
 
-    fn mend(&mut self) {
+    fn mend(&mut self, progress: &Progress) -> Result<(), Cancelled> {
         let largest = self.uv.iter().flatten().fold(0.0f32, |a, x| a.max(x.abs()));
         // At least the pitch of the grid at the largest coordinate.
         let pitch = f64::from(largest) * f64::from(f32::EPSILON);
@@ -147,7 +164,7 @@ impl Mender<'_> {
         for round in 0..ROUNDS {
             let thin_too = round < THIN_ROUNDS && !self.thin.is_empty() && tries[1] > 0;
             if self.turned.is_empty() && !thin_too {
-                return;
+                break;
             }
             let reach = pitch * f64::from(2u32 << (round / 2));
             let mut touched: Vec<FaceId> = self.turned.iter().chain(&self.thin).copied().collect();
@@ -159,6 +176,7 @@ impl Mender<'_> {
                         break;
                     }
                     *tries -= 1;
+                    progress.check()?;
                     if self.improve(v, reach) {
                         touched.extend(self.mesh.outgoing(v).map(|h| h.face()));
                     }
@@ -168,6 +186,7 @@ impl Mender<'_> {
             touched.dedup();
             self.look(touched.into_iter());
         }
+        Ok(())
     }
 
     /// Vertices of faces, each once, in the order of the faces; inner ones of a face first. With their
@@ -179,13 +198,14 @@ impl Mender<'_> {
             corners.sort_unstable_by_key(|&v| (self.mesh.is_boundary_vertex(v), v));
             order.extend(corners);
         }
-        if neighbours {
-            for i in 0..order.len() {
-                order.extend(self.mesh.neighbours(order[i]));
-            }
-        }
         let mut seen = std::collections::HashSet::new();
         order.retain(|&v| seen.insert(v));
+        if neighbours {
+            // Each of them once, or a vertex of many faces would name its neighbours for each of these.
+            for i in 0..order.len() {
+                order.extend(self.mesh.neighbours(order[i]).filter(|&v| seen.insert(v)));
+            }
+        }
         order
     }
 

@@ -5,7 +5,7 @@
 //! fit equally badly.
 
 use crate::geodesics::LandmarkDistances;
-use crate::linalg::{Mds, classical_mds};
+use crate::linalg::{EigenError, Mds, classical_mds};
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
 
@@ -40,7 +40,7 @@ pub(super) fn improve(
     let bends = Bends::new(mesh, graph, settings.crease_weight);
     let parts: Vec<Part> = (0..representatives.len())
         .map(|r| Part::new(mesh, graph, distances, representatives, r, settings.crease_share < 1.0))
-        .collect();
+        .collect::<Result<_, _>>()?;
     for a in 0..parts.len() {
         for b in a + 1..parts.len() {
             progress.check()?;
@@ -69,7 +69,7 @@ impl Part {
         representatives: &[usize],
         number: usize,
         embed: bool,
-    ) -> Self {
+    ) -> Result<Self, Cancelled> {
         let row = distances.row(representatives[number]);
         let reach = (0..graph.len()).map(|p| graph.mean_at(mesh, p, |v| f64::from(row[v]))).collect();
         let nearest = |l: usize| {
@@ -81,11 +81,15 @@ impl Part {
             let all = distances.between_landmarks();
             let pairs = landmarks.iter().flat_map(|&i| landmarks.iter().map(move |&j| (i, j)));
             let squared: Vec<f64> = pairs.map(|(i, j)| all[i * distances.len() + j].powi(2)).collect();
-            classical_mds(&squared, landmarks.len(), 2).ok()
+            match classical_mds(&squared, landmarks.len(), 2) {
+                Ok(scaling) => Some(scaling),
+                Err(EigenError::Cancelled(c)) => return Err(c),
+                Err(_) => None,
+            }
         } else {
             None
         };
-        Self { reach, landmarks, embedding }
+        Ok(Self { reach, landmarks, embedding })
     }
 
     /// Mean squared error of the distances of a polygon to the landmarks of this part, in its

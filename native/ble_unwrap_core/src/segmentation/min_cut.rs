@@ -455,6 +455,6 @@ mod tests {
         assert_eq!(solve(&CutGraph::new(2)), (0, vec![false, false]));
         let progress = Progress::new();
         progress.cancel();
-        assert_eq!(grid(100, |_, _| 1).min_cut(&progress), Err(Cancelled));
+        assert_eq!(grid(100, |_, _| 1).min_cut(&progress), Err(Cancelled::OnRequest));
     }
 }

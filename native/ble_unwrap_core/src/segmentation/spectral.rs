@@ -1,7 +1,8 @@
 //! Spectral analysis: how many dimensions the geodesic distances of a patch need.
 
 use crate::geodesics::LandmarkDistances;
-use crate::linalg::classical_mds;
+use crate::linalg::{EigenError, classical_mds};
+use crate::progress::Cancelled;
 
 /// Leading eigenvalues kept; iso-charts finds no use for more than ten.
 const KEPT: usize = 10;
@@ -22,16 +23,22 @@ pub struct SpectralAnalysis {
 impl SpectralAnalysis {
     /// Analyses the distances between the landmarks. Distances that are not finite (a patch is
     /// connected, so none should be) give no dimension and planarity 0. O(k³) for k landmarks.
-    #[must_use]
-    pub fn new(distances: &LandmarkDistances) -> Self {
+    ///
+    /// # Errors
+    /// [`Cancelled::OutOfMemory`].
+    pub fn new(distances: &LandmarkDistances) -> Result<Self, Cancelled> {
         let squared: Vec<f64> = distances.between_landmarks().into_iter().map(|d| d * d).collect();
-        let Ok(mds) = classical_mds(&squared, distances.len(), KEPT) else {
-            return Self { eigenvalues: Vec::new(), dimension: 0, planarity: 0.0, coordinates: Vec::new() };
+        let mds = match classical_mds(&squared, distances.len(), KEPT) {
+            Ok(mds) => mds,
+            Err(EigenError::Cancelled(c)) => return Err(c),
+            Err(_) => {
+                return Ok(Self { eigenvalues: Vec::new(), dimension: 0, planarity: 0.0, coordinates: Vec::new() });
+            }
         };
         let total = mds.eigenvalues.iter().filter(|l| **l > 0.0).sum();
         let eigenvalues = mds.eigenvalues[..mds.dimensions].to_vec();
         let dimension = dimension(&eigenvalues, total);
-        Self { dimension, planarity: mds.energy_share(2), eigenvalues, coordinates: mds.coordinates }
+        Ok(Self { dimension, planarity: mds.energy_share(2), eigenvalues, coordinates: mds.coordinates })
     }
 
     /// Coordinate `d` of landmark number `l`.

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::geodesics::{DijkstraScratch, FastMarching, MarchScratch, Metric, WeightedGraph, dijkstra};
+use crate::memory;
 use crate::mesh::{self, ConditionOptions, MeshError, MeshInput, Surface, VertexId};
 use crate::progress::{Cancelled, Progress, Stage};
 
@@ -25,7 +26,8 @@ pub enum DistancesError {
     },
     /// The result does not fit in memory.
     #[error(
-        "{sources} sources times {vertices} vertices are more distances than fit in memory; ask for fewer sources at a time"
+        "{sources} sources times {vertices} vertices are more distances than fit in memory ({}); ask for fewer sources at a time",
+        memory::text((*sources as u64).saturating_mul(*vertices as u64).saturating_mul(4))
     )]
     TooLarge {
         /// Number of sources.
@@ -66,8 +68,7 @@ pub fn surface_distances(
     }
     let too_large = || DistancesError::TooLarge { sources: sources.len(), vertices: n };
     let count = sources.len().checked_mul(n).ok_or_else(too_large)?;
-    let mut rows: Vec<f32> = Vec::new();
-    rows.try_reserve_exact(count).map_err(|_| too_large())?;
+    let mut rows: Vec<f32> = memory::required(count).map_err(|_| too_large())?;
     let surface = mesh::condition(input, &ConditionOptions::default(), progress)?;
     let places = Places::new(input, &surface);
     rows.resize(count, f32::INFINITY);

@@ -6,6 +6,7 @@ use thiserror::Error;
 use crate::geodesics::{
     Connectivity, DijkstraScratch, WeightedGraph, connectivity, dijkstra_within, knn_graph, shortest_bridges,
 };
+use crate::memory;
 use crate::progress::{Cancelled, Progress, Stage};
 
 /// Numbers of neighbours looked at for one that connects a cloud: above it the edges of most clouds leave their surface,
@@ -80,7 +81,8 @@ pub enum CloudDistancesError {
     NoNeighbours,
     /// The result does not fit in memory.
     #[error(
-        "{sources} sources times {points} points are more distances than fit in memory; ask for fewer sources at a time"
+        "{sources} sources times {points} points are more distances than fit in memory ({}); ask for fewer sources at a time",
+        memory::text((*sources as u64).saturating_mul(*points as u64).saturating_mul(8))
     )]
     TooLarge {
         /// Number of sources.
@@ -142,8 +144,7 @@ pub fn cloud_distances(
     }
     let too_large = || CloudDistancesError::TooLarge { sources: sources.len(), points: n };
     let count = sources.len().checked_mul(n).ok_or_else(too_large)?;
-    let mut rows: Vec<f64> = Vec::new();
-    rows.try_reserve_exact(count).map_err(|_| too_large())?;
+    let mut rows: Vec<f64> = memory::required(count).map_err(|_| too_large())?;
     // A power of two loses no bit, and squares of the scaled coordinates neither overflow nor vanish.
     let scale = power_of_two_within(points);
     let scaled: Vec<f64> = points.iter().map(|x| x / scale).collect();
@@ -343,7 +344,7 @@ mod tests {
         let cancelled = Progress::new();
         cancelled.cancel();
         let found = cloud_distances(&points, 4, None, &CloudDistanceSettings::default(), &cancelled);
-        assert_eq!(found, Err(CloudDistancesError::Cancelled(Cancelled)));
+        assert_eq!(found, Err(CloudDistancesError::Cancelled(Cancelled::OnRequest)));
         assert_eq!(distances(&[], None, &CloudDistanceSettings::default()), Ok(Vec::new()));
         assert_eq!(distances(&[1.0; 4], None, &CloudDistanceSettings::default()), Ok(vec![0.0]));
     }

@@ -32,7 +32,6 @@ pub(super) struct Barrier {
     to: Vec<u32>,
     vertex_reach: Vec<f64>,
     edge_reach: Vec<f64>,
-    longest_reach: f64,
     area: f64,
 }
 
@@ -73,7 +72,6 @@ impl Barrier {
             from: edges.iter().map(|&h| mesh.from(h).index() as u32).collect(),
             to: edges.iter().map(|&h| mesh.to(h).index() as u32).collect(),
             vertex_reach: edges.iter().map(|&h| vertex_reach[mesh.from(h).index()]).collect(),
-            longest_reach: edge_reach.iter().copied().fold(0.0, f64::max),
             edge_reach,
             edges,
             area: rest.iter().map(RestTriangle::area).sum(),
@@ -92,7 +90,7 @@ impl Barrier {
             let (a, b) = (uv[self.from[i] as usize], uv[self.to[i] as usize]);
             [a, b, a, b]
         };
-        let Some(grid) = Grid::new(self.edges.len(), hull, self.longest_reach, usize::MAX) else {
+        let Some(grid) = Grid::new(self.edges.len(), hull, |i| self.edge_reach[i], usize::MAX) else {
             return false;
         };
         let mut near = Vec::new();
@@ -166,7 +164,7 @@ impl Barrier {
                 let (a, b) = (self.from[i] as usize, self.to[i] as usize);
                 [uv[a], uv[b], moved[a], moved[b]]
             };
-            let Some(grid) = Grid::new(self.edges.len(), hull, 0.0, SWEEP_BUDGET * self.edges.len()) else {
+            let Some(grid) = Grid::new(self.edges.len(), hull, |_| 0.0, SWEEP_BUDGET * self.edges.len()) else {
                 most *= 0.5;
                 continue;
             };

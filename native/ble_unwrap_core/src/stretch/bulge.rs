@@ -8,10 +8,10 @@
 
 use std::f64::consts::FRAC_PI_6;
 
+use super::StretchError;
 use super::doubled_edge::enclosed_vertex;
 use super::laplacian::Laplacian;
 use crate::distortion::RestTriangle;
-use crate::linalg::SparseError;
 use crate::mesh::{TriMesh, VertexId, measure};
 
 /// Peaks below this (in u: two parts in a hundred of length) are no bulge.
@@ -37,8 +37,8 @@ pub struct Bulge {
 /// not overlap itself. O(n^1.5).
 ///
 /// # Errors
-/// [`SparseError`] where the system cannot be factored.
-pub fn bulge(mesh: &TriMesh, rest: &[RestTriangle]) -> Result<Bulge, SparseError> {
+/// [`StretchError::Solver`] where the system cannot be factored.
+pub fn bulge(mesh: &TriMesh, rest: &[RestTriangle]) -> Result<Bulge, StretchError> {
     let defect = measure::angle_defects(mesh);
     let is_closed = mesh.halfedges().all(|h| !mesh.is_boundary(h));
     let sharpest =

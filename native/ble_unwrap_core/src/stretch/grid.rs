@@ -24,12 +24,13 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Puts `hull(i)`, i < `count`, widened by `reach`, into about `count` cells. `None` if that takes
-    /// more than `budget` entries, or if a coordinate is not finite.
+    /// Puts `hull(i)`, i < `count`, widened by `reach(i)`, into about `count` cells. `None` if that takes
+    /// more than `budget` entries, or if a coordinate is not finite. Each item has a reach of its own: that of one long
+    /// edge, given to all the short ones, would fill the grid with each of them.
     pub(super) fn new(
         count: usize,
         hull: impl Fn(usize) -> [Point2<f64>; 4],
-        reach: f64,
+        reach: impl Fn(usize) -> f64,
         budget: usize,
     ) -> Option<Self> {
         let (mut low, mut high) =
@@ -39,14 +40,15 @@ impl Grid {
                 if !(p.x.is_finite() && p.y.is_finite()) {
                     return None;
                 }
-                low = low.inf(&p);
-                high = high.sup(&p);
+                let reach = Vector2::repeat(reach(i));
+                low = low.inf(&(p - reach));
+                high = high.sup(&(p + reach));
             }
         }
         if count == 0 {
             (low, high) = (Point2::origin(), Point2::origin());
         }
-        let size = (high - low).add_scalar(2.0 * reach);
+        let size = high - low;
         let longest = size.x.max(size.y);
         // Square cells, about as many as items; a degenerate extent still has one row.
         let side = (size.x * size.y / count.max(1) as f64).sqrt().max(longest / count.max(1) as f64);
@@ -54,7 +56,7 @@ impl Grid {
         let side = if side > 0.0 && side.is_finite() { side } else { 1.0 };
         let cells = |extent: f64| (extent / side).floor().clamp(0.0, MAX_SIDE) as usize + 1;
         let mut grid = Self {
-            origin: low - Vector2::repeat(reach),
+            origin: low,
             cell: Vector2::repeat(side),
             columns: cells(size.x),
             rows: cells(size.y),
@@ -63,7 +65,7 @@ impl Grid {
         };
         let mut entries: Vec<(u32, u32)> = Vec::new();
         for i in 0..count {
-            grid.for_cells(&hull(i), reach, |cell| entries.push((cell as u32, i as u32)));
+            grid.for_cells(&hull(i), reach(i), |cell| entries.push((cell as u32, i as u32)));
             if entries.len() > budget {
                 return None;
             }
@@ -159,12 +161,14 @@ mod tests {
                 [Point2::new(x, y), Point2::new(z, w)]
             };
             let hull = |i: usize| { let [a, b] = segment(i); [a, b, a, b] };
+            // Every other one with less.
+            let reach = |i: usize| if i.is_multiple_of(2) { reach } else { 0.5 * reach };
             let grid = Grid::new(ends.len(), hull, reach, usize::MAX).expect("within budget");
             let p = Point2::new(at[0], at[1]);
             let mut found = vec![false; ends.len()];
             grid.near(&[p], |i| found[i as usize] = true);
             for i in 0..ends.len() {
-                prop_assert!(found[i] || distance(segment(i), p) > reach);
+                prop_assert!(found[i] || distance(segment(i), p) > reach(i));
             }
         }
     }
@@ -176,15 +180,33 @@ mod tests {
             let t = i as f64 / 10_000.0;
             if i == 0 { [at(0.0), at(1.0), at(0.0), at(1.0)] } else { [Point2::new(t, 1.0 - t); 4] }
         };
-        let grid = Grid::new(10_000, hull, 0.0, usize::MAX).expect("within budget");
+        let grid = Grid::new(10_000, hull, |_| 0.0, usize::MAX).expect("within budget");
         assert!(grid.items.len() < 10_000 * 2 + 500, "{}", grid.items.len());
     }
 
     #[test]
+    fn one_long_reach_costs_in_proportion_to_the_items() {
+        // A sector of a disc: a thousand short edges of the rim, and its two sides.
+        let entries = |n: usize| {
+            let at = |i: usize| {
+                let angle = (i as f64 / n as f64).min(1.0);
+                Point2::new(angle.cos(), angle.sin())
+            };
+            let hull = |i: usize| {
+                if i < n { [at(i), at(i + 1), at(i), at(i + 1)] } else { [Point2::origin(), at(i), at(i), at(i)] }
+            };
+            let reach = |i: usize| if i < n { 0.25 / n as f64 } else { 0.25 };
+            Grid::new(n + 2, hull, reach, usize::MAX).expect("within budget").items.len()
+        };
+        let (few, many) = (entries(1000), entries(4000));
+        assert!(many < 5 * few, "{few} entries become {many} for four times as many edges");
+    }
+
+    #[test]
     fn refuses_bad_coordinates_and_keeps_to_its_budget() {
-        assert!(Grid::new(1, |_| [Point2::new(f64::NAN, 0.0); 4], 0.0, 100).is_none());
-        assert!(Grid::new(50, |i| [Point2::new(i as f64, 0.0); 4], 60.0, 100).is_none());
-        assert!(Grid::new(0, |_| [Point2::origin(); 4], 0.0, 0).is_some());
-        assert!(Grid::new(3, |_| [Point2::new(2.0, 2.0); 4], 0.0, 100).is_some());
+        assert!(Grid::new(1, |_| [Point2::new(f64::NAN, 0.0); 4], |_| 0.0, 100).is_none());
+        assert!(Grid::new(50, |i| [Point2::new(i as f64, 0.0); 4], |_| 60.0, 100).is_none());
+        assert!(Grid::new(0, |_| [Point2::origin(); 4], |_| 0.0, 0).is_some());
+        assert!(Grid::new(3, |_| [Point2::new(2.0, 2.0); 4], |_| 0.0, 100).is_some());
     }
 }

@@ -131,7 +131,7 @@ pub struct Minimised {
 /// Why a chart has no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum StretchError {
-    /// The computation was asked to stop.
+    /// The computation was asked to stop, or is out of memory.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
     /// Two edges join the same two vertices (or one edge joins a vertex to itself): with straight edges the
@@ -160,7 +160,17 @@ pub enum StretchError {
     OverlappingStart,
     /// The linear solver failed.
     #[error(transparent)]
-    Solver(#[from] SparseError),
+    Solver(SparseError),
+}
+
+impl From<SparseError> for StretchError {
+    fn from(error: SparseError) -> Self {
+        match error {
+            // No property of the chart: it must not be taken for one.
+            SparseError::OutOfMemory(error) => Self::Cancelled(Cancelled::OutOfMemory(error)),
+            other => Self::Solver(other),
+        }
+    }
 }
 
 /// Moves the vertices of a map without flips so that its stretch falls; no triangle ever flips (exact test),

@@ -91,7 +91,7 @@ fn visit_crossings(mesh: &TriMesh, uv: &[Point2<f64>], mut visit: impl FnMut(Hal
         let [a, b] = ends(edges[i]);
         [a, b, a, b]
     };
-    let Some(grid) = Grid::new(edges.len(), hull, 0.0, usize::MAX) else { return false };
+    let Some(grid) = Grid::new(edges.len(), hull, |_| 0.0, usize::MAX) else { return false };
     for cell in grid.cells() {
         for (k, &i) in cell.iter().enumerate() {
             for &j in &cell[..k] {

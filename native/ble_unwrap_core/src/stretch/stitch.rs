@@ -7,21 +7,21 @@
 
 use nalgebra::Point2;
 
+use super::StretchError;
 use super::laplacian::Laplacian;
 use crate::distortion::RestTriangle;
-use crate::linalg::SparseError;
 use crate::mesh::TriMesh;
 
 /// Positions that draw each face as near as can be to its three corners in `drawn`, by the lengths of their sides weighted
 /// with cotangents. May have flips and overlap. O(n^1.5).
 ///
 /// # Errors
-/// [`SparseError`] where the system cannot be factored.
+/// [`StretchError::Solver`] where the system cannot be factored.
 pub fn stitch(
     mesh: &TriMesh,
     rest: &[RestTriangle],
     drawn: &[[Point2<f64>; 3]],
-) -> Result<Vec<Point2<f64>>, SparseError> {
+) -> Result<Vec<Point2<f64>>, StretchError> {
     let n = mesh.vertex_count();
     let mut laplacian = Laplacian::new(mesh, rest, |_| false)?;
     let mut rhs = vec![0.0; 2 * n];

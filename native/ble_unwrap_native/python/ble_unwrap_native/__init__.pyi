@@ -1,6 +1,7 @@
 """Automatic UV unwrapping under a stretch bound, by Bernoulli logistic embedding."""
 
 import sys
+from collections.abc import Sequence
 from typing import Any, Literal, TypedDict, Unpack, final, type_check_only
 
 from typing_extensions import Buffer  # of collections.abc from Python 3.12 on
@@ -17,6 +18,7 @@ __all__ = [
     "InvalidArgumentError",
     "InvalidMeshError",
     "Job",
+    "OutOfMemoryError",
     "PackedCharts",
     "PointAtlas",
     "__version__",
@@ -41,6 +43,7 @@ class BleUnwrapError(Exception): ...
 class InvalidMeshError(BleUnwrapError): ...
 class InvalidArgumentError(BleUnwrapError): ...
 class Cancelled(BleUnwrapError): ...
+class OutOfMemoryError(BleUnwrapError, MemoryError): ...
 class InternalError(BleUnwrapError): ...
 
 @type_check_only
@@ -78,7 +81,7 @@ class _WeldSettings(TypedDict, total=False):
 @type_check_only
 class _TextureSettings(_Threads, total=False):
     margin: float
-    texture_size: int | tuple[int, int]
+    texture_size: int | Sequence[int]
 
 @type_check_only
 class _MeasureSettings(_TextureSettings, _WeldSettings, total=False): ...
@@ -129,6 +132,8 @@ class Analysis:
 
 @final
 class Array(Buffer):
+    def __new__(cls, data: bytes, format: Literal["f", "d", "i"], shape: Sequence[int], /) -> Array: ...
+    def __reduce__(self) -> tuple[type[Array], tuple[bytes, str, tuple[int, ...]]]: ...
     @property
     def shape(self) -> tuple[int, ...]: ...
     @property
@@ -139,6 +144,8 @@ class Array(Buffer):
 
 @final
 class Atlas:
+    def __new__(cls, uv: Array, chart: Array, report: dict[str, Any], /) -> Atlas: ...
+    def __reduce__(self) -> tuple[type[Atlas], tuple[Array, Array, dict[str, Any]]]: ...
     @property
     def uv(self) -> Array: ...
     @property
@@ -158,6 +165,8 @@ class Embedding:
 
 @final
 class Flattening:
+    def __new__(cls, embedded: Array, uv: Array, report: dict[str, Any], /) -> Flattening: ...
+    def __reduce__(self) -> tuple[type[Flattening], tuple[Array, Array, dict[str, Any]]]: ...
     @property
     def embedded(self) -> Array: ...
     @property
@@ -167,6 +176,8 @@ class Flattening:
 
 @final
 class PackedCharts:
+    def __new__(cls, uv: Array, report: dict[str, Any], /) -> PackedCharts: ...
+    def __reduce__(self) -> tuple[type[PackedCharts], tuple[Array, dict[str, Any]]]: ...
     @property
     def uv(self) -> Array: ...
     @property
@@ -174,6 +185,8 @@ class PackedCharts:
 
 @final
 class PointAtlas:
+    def __new__(cls, uv: Array, chart: Array, report: dict[str, Any], /) -> PointAtlas: ...
+    def __reduce__(self) -> tuple[type[PointAtlas], tuple[Array, Array, dict[str, Any]]]: ...
     @property
     def uv(self) -> Array: ...
     @property

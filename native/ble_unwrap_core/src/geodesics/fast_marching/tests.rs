@@ -231,6 +231,6 @@ fn cancel_stops_the_march() {
     let mut scratch = MarchScratch::default();
     assert_eq!(
         FastMarching::new(&mesh).march(&[(VertexId::new(0), 0.0)], &mut scratch, &progress).map(<[f64]>::len),
-        Err(Cancelled)
+        Err(Cancelled::OnRequest)
     );
 }

@@ -29,7 +29,7 @@ const NO_SHAPE: f64 = 1e-6;
 
 /// Neighbours of a vertex at most, for it to take part in a collapse, before and after. Bounds the
 /// work of one collapse. The hub of a fan stays while its rim is thinned.
-const MOST_NEIGHBOURS: u32 = 32;
+pub(super) const MOST_NEIGHBOURS: u32 = 32;
 
 /// Vertices tried between two looks at the cancel flag.
 const CHECK_EVERY: usize = 512;

@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 
+use super::collapse::MOST_NEIGHBOURS;
 use crate::mesh::measure::area_vector;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::progress::{Cancelled, Progress};
@@ -11,7 +12,7 @@ use crate::progress::{Cancelled, Progress};
 const CHECK_EVERY: usize = 1024;
 
 /// For each face of `fine` the face of `coarse` nearest to its centroid among those at the vertices
-/// its corners went to. A coarse face turned away counts as further: on a thin sheet the two sides
+/// its corners went to; at vertices of more than [`MOST_NEIGHBOURS`] only if there is no other. A coarse face turned away counts as further: on a thin sheet the two sides
 /// are as near as the coarsening is inexact, and share the vertices of the rim.
 pub(super) fn nearest_faces(
     fine: &TriMesh,
@@ -20,6 +21,7 @@ pub(super) fn nearest_faces(
     progress: &Progress,
 ) -> Result<Vec<FaceId>, Cancelled> {
     let plates: Vec<Plate> = coarse.faces().map(|f| Plate::new(coarse.triangle_positions(f))).collect();
+    let degree: Vec<u32> = coarse.vertices().map(|v| coarse.outgoing(v).count() as u32).collect();
     let nearest = |f: usize| {
         if f.is_multiple_of(CHECK_EVERY) {
             progress.check()?;
@@ -30,10 +32,7 @@ pub(super) fn nearest_faces(
         let normal = area_vector(p).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
         let roots = fine.triangle(f).map(|v| vertex[v.index()]);
         let mut best = (f64::INFINITY, FaceId::NONE);
-        for (k, &root) in roots.iter().enumerate() {
-            if roots[..k].contains(&root) {
-                continue;
-            }
+        for root in asked(roots, &degree) {
             for h in coarse.outgoing(root) {
                 let g = h.face();
                 let candidate = (plates[g.index()].remoteness(&centroid, &normal), g);
@@ -45,6 +44,15 @@ pub(super) fn nearest_faces(
         Ok(best.1)
     };
     (0..fine.face_count()).into_par_iter().with_min_len(CHECK_EVERY).map(nearest).collect()
+}
+
+/// The coarse vertices, each once, whose faces are candidates for a fine face with its corners there. All faces of a hub,
+/// asked for by each of its fine faces, would be quadratic, and those on its rim know the ones near: so not the hubs, but
+/// where all three are hubs the smallest. The sum of that over the triangles of a surface is linear.
+fn asked(roots: [VertexId; 3], degree: &[u32]) -> impl Iterator<Item = VertexId> {
+    let size = roots.map(|root| degree[root.index()]);
+    let most = size.into_iter().min().unwrap_or(0).max(MOST_NEIGHBOURS);
+    (0..3).filter(move |&k| size[k] <= most && !roots[..k].contains(&roots[k])).map(move |k| roots[k])
 }
 
 /// A triangle prepared for distances.
@@ -95,6 +103,27 @@ impl Plate {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_faces_asked_grow_with_the_mesh_and_not_with_its_hubs() {
+        // The faces that a cone asks which is coarsened no further: its tip has as many as its rim has edges.
+        let asked_of_cone = |n: usize| -> usize {
+            let positions: Vec<Point3<f64>> = std::iter::once(Point3::new(0.0, 0.0, 1.0))
+                .chain(
+                    (0..n)
+                        .map(|i| (i as f64 / n as f64 * std::f64::consts::TAU).sin_cos())
+                        .map(|(s, c)| Point3::new(c, s, 0.0)),
+                )
+                .collect();
+            let triangles: Vec<[u32; 3]> = (0..n).map(|i| [0, i as u32 + 1, ((i + 1) % n) as u32 + 1]).collect();
+            let (cone, _) = TriMesh::from_triangles(&positions, &triangles);
+            let degree: Vec<u32> = cone.vertices().map(|v| cone.outgoing(v).count() as u32).collect();
+            let faces = |f| asked(cone.triangle(f), &degree).map(|v| degree[v.index()] as usize).sum::<usize>();
+            cone.faces().map(faces).sum()
+        };
+        let (few, many) = (asked_of_cone(1000), asked_of_cone(4000));
+        assert!(few >= 1000 && many <= 4 * few, "{few} faces become {many} for four times as many");
+    }
 
     #[test]
     fn distance_to_a_triangle_is_that_to_its_nearest_sample() {

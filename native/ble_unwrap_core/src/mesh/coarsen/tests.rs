@@ -272,7 +272,7 @@ fn results_repeat_and_do_not_depend_on_threads() {
 fn cancelling_stops_it() {
     let progress = Progress::new();
     progress.cancel();
-    assert_eq!(coarsen(&sphere(3), 20, &progress).map(|c| c.source.len()), Err(Cancelled));
+    assert_eq!(coarsen(&sphere(3), 20, &progress).map(|c| c.source.len()), Err(Cancelled::OnRequest));
 }
 
 proptest! {

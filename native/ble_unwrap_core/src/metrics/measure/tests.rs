@@ -220,3 +220,30 @@ fn the_number_of_threads_changes_nothing() {
     assert_eq!(one, with(2));
     assert_eq!(one, with(8));
 }
+
+/// n×n squares of two triangles each, every one a chart of its own; square `(i, j)` is drawn out by `stretch(i, j)`.
+fn squares_apart(n: u32, stretch: impl Fn(u32, u32) -> f64) -> Layout {
+    let mut l = Layout::default();
+    for (i, j) in (0..n).flat_map(|j| (0..n).map(move |i| (i, j))) {
+        let first = l.positions.len() as u32;
+        for [x, y] in [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]] {
+            l.positions.push(Point3::new(2.0 * f64::from(i) + x, 2.0 * f64::from(j) + y, 0.0));
+            let side = 1.0 / f64::from(2 * n);
+            let u = side * (2.0 * f64::from(i) + x * stretch(i, j));
+            l.uv.push([u as f32, (side * (2.0 * f64::from(j) + y)) as f32]);
+        }
+        l.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        l.chart.extend([(j * n + i) as i32; 2]);
+    }
+    l.corners.clone_from(&l.triangles);
+    l
+}
+
+#[test]
+fn of_many_equal_small_charts_one_is_the_worst() {
+    // 10,201 charts of less than 1e-4 of the surface each; one is drawn out by a half: its L2 is ½(1 + 1/2.25)·1.5.
+    let m = squares_apart(101, |i, j| if (i, j) == (7, 3) { 1.5 } else { 1.0 }).measure(Texture::square(4096, 0.0));
+    assert_eq!((m.charts, m.worst_chart), (101 * 101, Some(3 * 101 + 7)));
+    let expected = (0.5 * (1.0 + 1.0 / 2.25) * 1.5f64).sqrt();
+    assert!((m.l2_worst_chart - expected).abs() < 1e-3, "{} {expected}", m.l2_worst_chart);
+}
