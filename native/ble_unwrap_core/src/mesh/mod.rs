@@ -13,6 +13,7 @@ mod index;
 mod input;
 pub mod measure;
 mod orient;
+mod quad;
 #[cfg(test)]
 pub(crate) mod test_surfaces;
 mod tri_mesh;
@@ -26,5 +27,6 @@ pub(crate) use disjoint_sets::DisjointSets;
 pub use groups::Groups;
 pub use index::{FaceId, HalfedgeId, VertexId};
 pub use input::{MeshError, MeshInput};
+pub use quad::{Quad, is_convex};
 pub use tri_mesh::{Topology, TriMesh};
 pub(crate) use weld::weld;

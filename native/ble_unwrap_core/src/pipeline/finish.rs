@@ -19,7 +19,7 @@ use crate::verify::{self, Certificate};
 
 use super::memo::Run;
 use super::rungs::{Rung, Rungs};
-use super::{Atlas, Clock, charting, flatten, polygon};
+use super::{Atlas, Clock, charting, flatten, polygon, unbend};
 
 /// Rounds of packing, checking and mending. Needles that rounding breaks are gone after one; the rest
 /// is for charts whose parts break again.
@@ -51,6 +51,8 @@ pub(super) fn finish(
     let arrays = Arrays::new(input, surface, settings.weld);
     let mut round = 0;
     loop {
+        charts = unbend::unbend(charts, settings, &mut rungs, progress)?;
+        clock.lap("unbend");
         progress.enter(Stage::Pack);
         scale(&mut charts, settings);
         let layout = Layout::new(input, surface, &charts, settings, progress)?;
@@ -71,6 +73,10 @@ pub(super) fn finish(
             report.faces = input.face_offsets.len().saturating_sub(1);
             report.unmapped_faces = surface.unmapped.len();
             report.warnings = warnings(surface, &layout, &certificate);
+            report.bent_quads = metrics::bent_quads(input, &layout.uv, |face| layout.polygon_chart[face] >= 0).len();
+            if report.bent_quads > 0 {
+                report.warnings.push(unbend::warning(report.bent_quads));
+            }
             if let Some(&(chart, l2)) = report.charts_over_limit.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
                 report.warnings.push(format!(
                     "{} charts exceed the stretch limit, the worst is chart {chart} with {l2:.3}",
@@ -204,7 +210,8 @@ impl Layout {
                 Point2::new(texel.x / size[0], texel.y / size[1])
             };
             let exact: Vec<Point2<f64>> = chart.uv.iter().map(place).collect();
-            let uv = match rounding::round_to_f32(&chart.patch.mesh, &exact, &rounding) {
+            let halves = unbend::convex_halves(chart);
+            let uv = match rounding::round_to_f32(&chart.patch.mesh, &halves, &exact, &rounding) {
                 Ok(rounded) => rounded.uv,
                 Err(unmendable) => {
                     let faces = unmendable.faces.iter().map(|f| (number, chart.patch.faces[f.index()]));

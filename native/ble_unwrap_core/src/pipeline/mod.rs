@@ -25,6 +25,7 @@ mod rungs;
 mod sew;
 mod steps;
 mod tally;
+mod unbend;
 
 use std::time::Instant;
 
