@@ -28,6 +28,8 @@ pub struct Report {
     pub area_distortion: f64,
     /// Triangles turned over.
     pub flips: usize,
+    /// Quads that are convex on the surface and not in UV, see [`bent_quads`](crate::metrics::bent_quads()).
+    pub bent_quads: usize,
     /// Pairs of triangles that share area.
     pub overlaps: u64,
     /// Length of the seams over the square root of the surface area.

@@ -40,7 +40,7 @@ use crate::unwrap::MeshArrays;
 ///     ``triangles``, ``degenerate_triangles``, ``uv_degenerate_triangles``;
 ///     L2 stretch: ``l2`` at the layout's best scale, ``l2_chart_scale`` with each chart at its own, ``l2_worst_chart``,
 ///     ``chart_l2`` (a list); ``l_infinity``, ``angle_distortion``, ``area_distortion`` (all 1 at best);
-///     ``flips`` (triangles), ``overlaps`` and ``overlaps_between`` islands (pairs of triangles; lower bounds unless
+///     ``flips`` (triangles), ``bent_quads`` (convex on the surface and not in UV), ``overlaps`` and ``overlaps_between`` islands (pairs of triangles; lower bounds unless
 ///     ``overlaps_complete``); ``seam_length`` over the root of the area and ``seam_length_absolute``;
 ///     ``packing_efficiency``, ``gap_texels`` between islands (at most 8 or twice ``margin``; an upper bound unless
 ///     ``gap_complete``), ``uv_box`` (its lower left and upper right corner). Where nothing could be measured, NaN.

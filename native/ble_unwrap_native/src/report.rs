@@ -19,6 +19,7 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'
         angle_distortion,
         area_distortion,
         flips,
+        bent_quads,
         overlaps,
         seam_length,
         seam_length_absolute,
@@ -43,6 +44,7 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'
     dict.set_item("angle_distortion", angle_distortion)?;
     dict.set_item("area_distortion", area_distortion)?;
     dict.set_item("flips", flips)?;
+    dict.set_item("bent_quads", bent_quads)?;
     dict.set_item("overlaps", overlaps)?;
     dict.set_item("seam_length", seam_length)?;
     dict.set_item("seam_length_absolute", seam_length_absolute)?;
@@ -59,7 +61,7 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'
 
 /// The measures of a layout, with the keys of a report and some of their own.
 pub(crate) fn measures_to_dict(py: Python<'_>, layout: LayoutMeasures) -> PyResult<Bound<'_, PyDict>> {
-    let LayoutMeasures { faces, unmapped_faces, measures } = layout;
+    let LayoutMeasures { faces, unmapped_faces, bent_quads, measures } = layout;
     let dict = PyDict::new(py);
     dict.set_item("charts", measures.charts)?;
     dict.set_item("islands", measures.islands)?;
@@ -75,6 +77,7 @@ pub(crate) fn measures_to_dict(py: Python<'_>, layout: LayoutMeasures) -> PyResu
     dict.set_item("angle_distortion", measures.angle_distortion)?;
     dict.set_item("area_distortion", measures.area_distortion)?;
     dict.set_item("flips", measures.flips)?;
+    dict.set_item("bent_quads", bent_quads)?;
     dict.set_item("overlaps", measures.overlaps)?;
     dict.set_item("overlaps_between", measures.overlaps_between)?;
     dict.set_item("overlaps_complete", measures.overlaps_complete)?;

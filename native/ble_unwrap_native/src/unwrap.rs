@@ -200,7 +200,7 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 /// Atlas
 ///     ``uv`` (c, 2) float32, ``chart`` (f,) int32 and ``report``, a dict with ``charts``, ``faces``,
 ///     ``unmapped_faces``, ``l2``, ``l2_chart_scale``, ``l2_worst_chart``, ``l_infinity``, ``angle_distortion``,
-///     ``area_distortion``, ``flips``, ``overlaps``, ``seam_length``, ``packing_efficiency``, ``gap_texels``,
+///     ``area_distortion``, ``flips``, ``bent_quads``, ``overlaps``, ``seam_length``, ``packing_efficiency``, ``gap_texels``,
 ///     ``chart_limit``, ``atlas_limit``, ``charts_over_limit``, ``rungs``, ``seconds``, ``warnings`` and more.
 ///
 /// Raises

@@ -37,10 +37,12 @@ pub enum Rung {
     Merge,
     /// A few polygons crushed at a border were handed over it.
     Recut,
+    /// Quads that came out bent were made convex.
+    Unbend,
 }
 
 impl Rung {
-    const ALL: [Self; 17] = [
+    const ALL: [Self; 18] = [
         Self::Plane,
         Self::Unfold,
         Self::Projection,
@@ -58,6 +60,7 @@ impl Rung {
         Self::Thicken,
         Self::Merge,
         Self::Recut,
+        Self::Unbend,
     ];
 
     /// A short name for reports.
@@ -81,6 +84,7 @@ impl Rung {
             Self::Thicken => "thicken",
             Self::Merge => "merge",
             Self::Recut => "recut",
+            Self::Unbend => "unbend",
         }
     }
 }

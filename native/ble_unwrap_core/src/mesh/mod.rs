@@ -16,6 +16,7 @@ mod input;
 mod irregular;
 pub mod measure;
 mod orient;
+mod quad;
 #[cfg(test)]
 pub(crate) mod test_surfaces;
 mod tri_mesh;
@@ -29,4 +30,5 @@ pub(crate) use disjoint_sets::DisjointSets;
 pub use groups::Groups;
 pub use index::{FaceId, HalfedgeId, VertexId};
 pub use input::{MeshError, MeshInput};
+pub use quad::{Quad, is_convex};
 pub use tri_mesh::{Topology, TriMesh};

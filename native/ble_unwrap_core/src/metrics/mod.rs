@@ -5,6 +5,7 @@
 //! numbers; only index arrays are checked, by [`UvMesh::new`]. The exact checks of our own results
 //! are in [`verify`](crate::verify()).
 
+mod bent_quads;
 mod box_tree;
 mod gap;
 mod measure;
@@ -12,6 +13,7 @@ mod overlap;
 mod uv_mesh;
 mod uv_topology;
 
+pub use bent_quads::bent_quads;
 pub use measure::{ChartMeasures, Measures, measure};
 pub use uv_mesh::{Texture, UvMesh, UvMeshError};
 

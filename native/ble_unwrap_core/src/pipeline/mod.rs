@@ -24,6 +24,7 @@ mod ribbons;
 mod rigid;
 mod sew;
 mod tally;
+mod unbend;
 
 use crate::atlas::Atlas;
 use crate::clock::Clock;

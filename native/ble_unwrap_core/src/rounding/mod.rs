@@ -3,7 +3,8 @@
 //! Near 1 the float32 grid has a pitch of 6e-8. A needle or a very small triangle may collapse on it
 //! or change its orientation. Then vertices of the triangle are moved, one by one, by a few grid
 //! steps: each to where the least height in its star is greatest (a linear program in two variables,
-//! `kernel`), as far as the grid lets it. Boundary vertices stay within a 64th of a texel.
+//! `kernel`), as far as the grid lets it. Boundary vertices stay within a 64th of a texel. The halves that quads have by
+//! their other diagonal are looked after in the same way, behind the faces.
 
 mod kernel;
 
@@ -78,11 +79,12 @@ pub enum RoundingError {
     Cancelled(#[from] Cancelled),
 }
 
-/// Rounds the final UVs of a chart, one for each vertex of `mesh`, to float32 in [0, 1].
+/// Rounds the final UVs of a chart, one for each vertex of `mesh`, to float32 in [0, 1]. `halves` are further triangles over
+/// its vertices that should stay positive, too: those that quads have by their other diagonal.
 ///
 /// Guaranteed: every triangle of the result is strictly positive by an exact test; vertices whose
 /// triangles survive plain rounding are rounded plainly; the result depends on the arguments alone.
-/// Not guaranteed: that moved boundary vertices leave the boundary simple (they move less than a 64th
+/// Not guaranteed: that all of `halves` are positive (no face is given up for one); that moved boundary vertices leave the boundary simple (they move less than a 64th
 /// of a texel; [`verify`](crate::verify()) tells).
 ///
 /// O(n) and one pass where nothing breaks; a bounded number of moves otherwise.
@@ -94,6 +96,7 @@ pub enum RoundingError {
 /// If `uv` does not hold one point a vertex.
 pub fn round_to_f32(
     mesh: &TriMesh,
+    halves: &[[VertexId; 3]],
     uv: &[Point2<f64>],
     rounding: &Rounding,
     progress: &Progress,
@@ -101,10 +104,19 @@ pub fn round_to_f32(
     assert_eq!(uv.len(), mesh.vertex_count(), "one UV a vertex");
     // Adding 0 makes −0 plain.
     let plain: Vec<[f32; 2]> = uv.iter().map(|p| [p.x as f32 + 0.0, p.y as f32 + 0.0]).collect();
-    let mut mender =
-        Mender { mesh, home: uv, uv: plain.clone(), rounding, goal: Vec::new(), turned: Vec::new(), thin: Vec::new() };
+    let mut mender = Mender {
+        mesh,
+        halves: Halves { triangles: halves, turned: Vec::new(), at: Vec::new() },
+        home: uv,
+        uv: plain.clone(),
+        rounding,
+        goal: Vec::new(),
+        turned: Vec::new(),
+        thin: Vec::new(),
+    };
     mender.goal = mesh.faces().map(|f| mender.surface_goal(f)).collect();
     mender.look(mesh.faces());
+    mender.halves.look(&mender.uv);
     mender.mend(progress)?;
     let moved = mender.uv.iter().zip(&plain).filter(|(a, b)| a != b && !(a[0].is_nan() || a[1].is_nan())).count();
     if mender.turned.is_empty() {
@@ -114,8 +126,51 @@ pub fn round_to_f32(
     }
 }
 
+/// The halves that quads have by their other diagonal.
+struct Halves<'a> {
+    triangles: &'a [[VertexId; 3]],
+    /// Those not strictly positive, ascending.
+    turned: Vec<usize>,
+    /// Each with each of its vertices, by vertex; empty until one is asked for.
+    at: Vec<(VertexId, u32)>,
+}
+
+impl Halves<'_> {
+    /// Finds those that are turned over.
+    fn look(&mut self, uv: &[[f32; 2]]) {
+        let is_turned = |k: &usize| {
+            let [a, b, c] = self.triangles[*k].map(|v| uv[v.index()]);
+            !is_positive(double_area(a, b, c))
+        };
+        self.turned = (0..self.triangles.len()).filter(is_turned).collect();
+    }
+
+    /// Lists them by vertex.
+    fn sort(&mut self) {
+        let corners = |(k, t): (usize, &[VertexId; 3])| t.map(|v| (v, k as u32));
+        self.at = self.triangles.iter().enumerate().flat_map(corners).collect();
+        self.at.sort_unstable();
+    }
+
+    /// The other two vertices, in order, of each one that a vertex belongs to.
+    fn opposite(&self, v: VertexId) -> impl Iterator<Item = [VertexId; 2]> + '_ {
+        let first = self.at.partition_point(|entry| entry.0 < v);
+        self.at[first..].iter().take_while(move |entry| entry.0 == v).map(move |&(_, k)| {
+            let [a, b, c] = self.triangles[k as usize];
+            if a == v {
+                [b, c]
+            } else if b == v {
+                [c, a]
+            } else {
+                [a, b]
+            }
+        })
+    }
+}
+
 struct Mender<'a> {
     mesh: &'a TriMesh,
+    halves: Halves<'a>,
     home: &'a [Point2<f64>],
     uv: Vec<[f32; 2]>,
     rounding: &'a Rounding,
@@ -160,16 +215,23 @@ impl Mender<'_> {
         let largest = self.uv.iter().flatten().fold(0.0f32, |a, x| a.max(x.abs()));
         // At least the pitch of the grid at the largest coordinate.
         let pitch = f64::from(largest) * f64::from(f32::EPSILON);
-        let mut tries = [TRIES + 2 * self.mesh.vertex_count(); 2];
+        let mut tries = [TRIES + 2 * self.mesh.vertex_count(); 3];
         for round in 0..ROUNDS {
             let thin_too = round < THIN_ROUNDS && !self.thin.is_empty() && tries[1] > 0;
-            if self.turned.is_empty() && !thin_too {
+            let halves_too = !self.halves.turned.is_empty() && tries[2] > 0;
+            if self.turned.is_empty() && !thin_too && !halves_too {
                 break;
+            }
+            if round == 0 {
+                self.halves.sort();
             }
             let reach = pitch * f64::from(2u32 << (round / 2));
             let mut touched: Vec<FaceId> = self.turned.iter().chain(&self.thin).copied().collect();
-            let lists = [self.turned.clone(), if thin_too { self.thin.clone() } else { Vec::new() }];
-            let reaches = [reach, reach.max(2.0 * HEIGHT)];
+            let corners = |faces: &[FaceId]| faces.iter().map(|&f| self.mesh.triangle(f)).collect();
+            let turned_halves = self.halves.turned.iter().map(|&k| self.halves.triangles[k]).collect();
+            let lists: [Vec<[VertexId; 3]>; 3] =
+                [corners(&self.turned), if thin_too { corners(&self.thin) } else { Vec::new() }, turned_halves];
+            let reaches = [reach, reach.max(2.0 * HEIGHT), reach];
             for ((list, reach), tries) in lists.iter().zip(reaches).zip(&mut tries) {
                 for v in self.vertices_of(list, round >= NEIGHBOUR_ROUND) {
                     if *tries == 0 {
@@ -185,16 +247,16 @@ impl Mender<'_> {
             touched.sort_unstable();
             touched.dedup();
             self.look(touched.into_iter());
+            self.halves.look(&self.uv);
         }
         Ok(())
     }
 
-    /// Vertices of faces, each once, in the order of the faces; inner ones of a face first. With their
+    /// Vertices of triangles, each once, in the order of these; inner ones of a triangle first. With their
     /// neighbours behind them if asked.
-    fn vertices_of(&self, faces: &[FaceId], neighbours: bool) -> Vec<VertexId> {
-        let mut order = Vec::with_capacity(3 * faces.len());
-        for &f in faces {
-            let mut corners = self.mesh.triangle(f);
+    fn vertices_of(&self, triangles: &[[VertexId; 3]], neighbours: bool) -> Vec<VertexId> {
+        let mut order = Vec::with_capacity(3 * triangles.len());
+        for &(mut corners) in triangles {
             corners.sort_unstable_by_key(|&v| (self.mesh.is_boundary_vertex(v), v));
             order.extend(corners);
         }
@@ -222,11 +284,14 @@ impl Mender<'_> {
         let lo = [0, 1].map(|k| (-reach[k]).max(-home[k]).min(0.0));
         let hi = [0, 1].map(|k| reach[k].min(1.0 - home[k]).max(0.0));
         let local = |p: [f32; 2]| Vector2::new(f64::from(p[0]) - home.x, f64::from(p[1]) - home.y);
-        let star: Vec<Opposite> = self
-            .mesh
-            .outgoing(v)
-            .map(|h| {
-                let (p, q) = (self.at(self.mesh.to(h)), self.at(self.mesh.from(h.prev())));
+        let faces = self.mesh.outgoing(v).map(|h| {
+            let goal = f64::from(self.goal[h.face().index()]);
+            ([self.mesh.to(h), self.mesh.from(h.prev())], goal, false)
+        });
+        let star: Vec<Opposite> = faces
+            .chain(self.halves.opposite(v).map(|ends| (ends, 0.0, true)))
+            .map(|(ends, goal, is_half)| {
+                let [p, q] = ends.map(|w| self.at(w));
                 let (a, b) = (local(p), local(q));
                 let d = b - a;
                 let gradient = Vector2::new(-d.y, d.x);
@@ -235,9 +300,9 @@ impl Mender<'_> {
                     constant + [0, 1].map(|k| (gradient[k] * lo[k]).max(gradient[k] * hi[k])).iter().sum::<f64>();
                 // No more than half of what this vertex alone can reach, or a face that others must
                 // mend would hide the rest.
-                let goal = f64::from(self.goal[h.face().index()]).max(0.25 * f64::from(f32::EPSILON));
+                let goal = goal.max(0.25 * f64::from(f32::EPSILON));
                 let want = (goal * a.norm().max(b.norm()).max(d.norm())).min(0.5 * most);
-                Opposite { p, q, constraint: Constraint { gradient, constant, want } }
+                Opposite { p, q, is_half, constraint: Constraint { gradient, constant, want } }
             })
             .collect();
         let constraints: Vec<Constraint> = star.iter().map(|o| o.constraint).filter(|c| c.want > 0.0).collect();
@@ -255,7 +320,8 @@ impl Mender<'_> {
                 }
             }
         }
-        let better = winning.turned < current.turned || winning.least > current.least + 1e-3 * current.least.abs();
+        let better = (winning.turned, winning.bent) < (current.turned, current.bent)
+            || winning.least > current.least + 1e-3 * current.least.abs();
         if better {
             self.uv[v.index()] = winner;
         }
@@ -263,10 +329,10 @@ impl Mender<'_> {
     }
 
     fn score(&self, star: &[Opposite], x: [f32; 2], home: Point2<f64>) -> Score {
-        let mut score = Score { turned: 0, least: 1.0, distance: 0.0 };
+        let mut score = Score { turned: 0, bent: 0, least: 1.0, distance: 0.0 };
         for o in star {
             let area = double_area(x, o.p, o.q);
-            score.turned += usize::from(!is_positive(area));
+            *(if o.is_half { &mut score.bent } else { &mut score.turned }) += usize::from(!is_positive(area));
             if o.constraint.want > 0.0 {
                 score.least = score.least.min(area / o.constraint.want);
             }
@@ -276,10 +342,11 @@ impl Mender<'_> {
     }
 }
 
-/// The edge of a face opposite to the vertex that moves.
+/// The edge of a face, or of a quad's other half, opposite to the vertex that moves.
 struct Opposite {
     p: [f32; 2],
     q: [f32; 2],
+    is_half: bool,
     constraint: Constraint,
 }
 
@@ -288,6 +355,8 @@ struct Opposite {
 struct Score {
     /// Faces of its star that are not strictly positive.
     turned: usize,
+    /// Other halves of quads that are not.
+    bent: usize,
     /// The least share of what each face wants; at most 1.
     least: f64,
     /// Distance from where the vertex belongs.
@@ -296,8 +365,8 @@ struct Score {
 
 impl Score {
     fn beats(&self, other: &Self) -> bool {
-        if self.turned != other.turned {
-            return self.turned < other.turned;
+        if (self.turned, self.bent) != (other.turned, other.bent) {
+            return (self.turned, self.bent) < (other.turned, other.bent);
         }
         self.least > other.least || (self.least == other.least && self.distance < other.distance)
     }

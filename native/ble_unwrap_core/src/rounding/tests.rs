@@ -67,7 +67,7 @@ fn all_positive(mesh: &TriMesh, uv: &[[f32; 2]]) -> bool {
 #[test]
 fn a_healthy_chart_is_rounded_plainly() {
     let (mesh, uv) = grid_with_needles(10, 0.02);
-    let r = round_to_f32(&mesh, &uv, &ROUNDING, &Progress::new()).expect("nothing to mend");
+    let r = round_to_f32(&mesh, &[], &uv, &ROUNDING, &Progress::new()).expect("nothing to mend");
     assert_eq!((r.moved, r.thin_faces), (0, 0));
     assert!(r.uv.iter().zip(&uv).all(|(a, b)| *a == [b.x as f32, b.y as f32]));
 }
@@ -78,7 +78,7 @@ fn needles_that_collapse_are_mended() {
         let (mesh, uv) = grid_with_needles(10, thin);
         let uv = placed(&uv, 0.45, [0.52, 0.51]);
         assert!(broken_by_plain_rounding(&mesh, &uv) > 10);
-        let r = round_to_f32(&mesh, &uv, &ROUNDING, &Progress::new()).expect("mendable");
+        let r = round_to_f32(&mesh, &[], &uv, &ROUNDING, &Progress::new()).expect("mendable");
         assert!(all_positive(&mesh, &r.uv) && is_injective(&mesh, &r.uv) && r.moved > 0);
         for (v, (a, b)) in mesh.vertices().zip(r.uv.iter().zip(&uv)) {
             let d = (f64::from(a[0]) - b.x).abs().max((f64::from(a[1]) - b.y).abs());
@@ -93,7 +93,7 @@ fn thin_but_positive_triangles_are_widened() {
     // On the surface the strips are well above the bound for degenerate triangles, in UV below.
     let (mesh, wide) = grid_with_needles(6, 1e-3);
     let uv = placed(&wide, 1e-4, [0.4, 0.3]);
-    let r = round_to_f32(&mesh, &uv, &ROUNDING, &Progress::new()).expect("mendable");
+    let r = round_to_f32(&mesh, &[], &uv, &ROUNDING, &Progress::new()).expect("mendable");
     assert!(all_positive(&mesh, &r.uv));
     assert_eq!(r.thin_faces, 0, "strips of 1e-7 can be had three times as wide");
 }
@@ -104,9 +104,9 @@ fn a_tiny_chart_with_needles_is_mended() {
     let (mesh, uv) = grid_with_needles(8, 1e-3);
     let uv = placed(&uv, 1e-5, [0.777_777, 0.654_321]);
     assert!(broken_by_plain_rounding(&mesh, &uv) > 10);
-    let r = round_to_f32(&mesh, &uv, &ROUNDING, &Progress::new()).expect("mendable");
+    let r = round_to_f32(&mesh, &[], &uv, &ROUNDING, &Progress::new()).expect("mendable");
     assert!(all_positive(&mesh, &r.uv) && is_injective(&mesh, &r.uv));
-    assert_eq!(round_to_f32(&mesh, &uv, &ROUNDING, &Progress::new()).expect("mendable"), r);
+    assert_eq!(round_to_f32(&mesh, &[], &uv, &ROUNDING, &Progress::new()).expect("mendable"), r);
 }
 
 #[test]
@@ -115,13 +115,13 @@ fn what_cannot_be_mended_is_named() {
     // 3200 triangles on a handful of grid points.
     let tiny = placed(&uv, 1e-9, [0.9, 0.9]);
     let coarse = Rounding { texel: [1e-9; 2], ..ROUNDING };
-    let e = round_to_f32(&mesh, &tiny, &coarse, &Progress::new()).expect_err("no room");
+    let e = round_to_f32(&mesh, &[], &tiny, &coarse, &Progress::new()).expect_err("no room");
     let RoundingError::Unmendable(e) = e else { panic!("{e}") };
     assert!(!e.faces.is_empty() && e.faces.is_sorted() && e.uv.len() == uv.len());
     assert!(e.to_string().contains("lose their orientation"));
     let mut broken = uv.clone();
     broken[7] = Point2::new(f64::NAN, 0.5);
-    assert!(round_to_f32(&mesh, &broken, &ROUNDING, &Progress::new()).is_err());
+    assert!(round_to_f32(&mesh, &[], &broken, &ROUNDING, &Progress::new()).is_err());
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn results_stay_in_the_unit_square() {
     let (mesh, uv) = grid_with_needles(10, 1e-10);
     for shift in [[0.0, 0.0], [1.0 - 1e-4, 1.0 - 1e-4]] {
         let uv: Vec<_> = placed(&uv, 1e-4, shift).iter().map(|p| Point2::new(p.x.min(1.0), p.y.min(1.0))).collect();
-        let r = round_to_f32(&mesh, &uv, &ROUNDING, &Progress::new()).expect("mendable");
+        let r = round_to_f32(&mesh, &[], &uv, &ROUNDING, &Progress::new()).expect("mendable");
         assert!(all_positive(&mesh, &r.uv) && is_injective(&mesh, &r.uv));
         assert!(r.uv.iter().flatten().all(|x| (0.0..=1.0).contains(x)));
     }

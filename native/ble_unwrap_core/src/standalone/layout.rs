@@ -44,6 +44,8 @@ pub struct LayoutMeasures {
     pub faces: usize,
     /// Faces that have a negative chart, a corner whose UV is not finite, or a vertex that is not.
     pub unmapped_faces: usize,
+    /// Quads that are convex on the surface and not in UV, see [`bent_quads`](metrics::bent_quads()).
+    pub bent_quads: usize,
     /// The figures of the triangulated faces, those with a non-finite vertex left out.
     pub measures: Measures,
 }
@@ -93,7 +95,9 @@ pub fn measure_layout(
         let corners = input.face_offsets[p] as usize..input.face_offsets[p + 1] as usize;
         *mapped &= chart.is_none_or(|chart| chart[p] >= 0) && uv[corners].iter().flatten().all(|x| x.is_finite());
     }
-    Ok(LayoutMeasures { faces, unmapped_faces: mapped.iter().filter(|mapped| !**mapped).count(), measures })
+    let bent_quads = metrics::bent_quads(input, uv, |face| mapped[face]).len();
+    let unmapped_faces = mapped.iter().filter(|mapped| !**mapped).count();
+    Ok(LayoutMeasures { faces, unmapped_faces, bent_quads, measures })
 }
 
 #[cfg(test)]

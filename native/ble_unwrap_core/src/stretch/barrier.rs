@@ -219,6 +219,7 @@ fn quadratic_roots(a: f64, b: f64, c: f64) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stretch::other_halves::OtherHalves;
     use crate::stretch::test_meshes::strip;
 
     /// A strip bent to a horseshoe whose ends nearly touch.
@@ -242,7 +243,7 @@ mod tests {
         let barrier = Barrier::new(&mesh, &rest, BOUNDARY_REACH);
         assert!(barrier.value(&uv) > 0.0);
         assert_eq!(barrier.value(&horseshoe(0.5).1), 0.0);
-        let mut system = ChartSystem::new(&mesh, &rest).expect("analysis");
+        let mut system = ChartSystem::new(&mesh, &rest, &OtherHalves::default()).expect("analysis");
         barrier.assemble(&uv, &mut system);
         let g = system.gradient().to_vec();
         let h = 1e-7;

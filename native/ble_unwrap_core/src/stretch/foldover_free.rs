@@ -10,10 +10,11 @@ use nalgebra::Point2;
 use super::StretchError;
 use super::energy::FoldoverEnergy;
 use super::neighbourhood::Neighbourhood;
+use super::other_halves::OtherHalves;
 use super::overlap::first_flip;
 use super::system::{ChartSystem, advance};
 use crate::distortion::RestTriangle;
-use crate::mesh::{FaceId, TriMesh};
+use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::progress::Progress;
 
 /// Newton steps in a round,
@@ -50,7 +51,7 @@ pub(super) fn foldover_free(
     progress: &Progress,
 ) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
     let mut patience = Patience::default();
-    let mut clearing = Clearing::new(mesh, rest, start.to_vec(), 0.0, WIDE)?;
+    let mut clearing = Clearing::new(mesh, rest, &OtherHalves::default(), start.to_vec(), 0.0, WIDE)?;
     while !clearing.is_done() {
         if patience.ends(collapsed(mesh, rest, &clearing.uv)) || !clearing.round(&[], progress)? {
             break;
@@ -61,7 +62,12 @@ pub(super) fn foldover_free(
 
 /// Whether a triangle is flipped or so nearly collapsed that Newton's steps would end there.
 pub(super) fn is_collapsed(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>], f: FaceId) -> bool {
-    rest[f.index()].jacobian(mesh.triangle(f).map(|v| uv[v.index()])).determinant() < COLLAPSED
+    is_triangle_collapsed(&rest[f.index()], mesh.triangle(f), uv)
+}
+
+/// The same of a triangle that need not be a face.
+pub(super) fn is_triangle_collapsed(rest: &RestTriangle, triangle: [VertexId; 3], uv: &[Point2<f64>]) -> bool {
+    rest.jacobian(triangle.map(|v| uv[v.index()])).determinant() < COLLAPSED
 }
 
 /// Number of such triangles.
@@ -91,7 +97,8 @@ pub(super) fn foldover_free_near(
             break;
         }
         let near = Neighbourhood::new(mesh, rest, &bad, rings);
-        let mut clearing = Clearing::new(&near.mesh, &near.rest, near.read(&uv), COLLAPSED, epsilon)?;
+        let none = OtherHalves::default();
+        let mut clearing = Clearing::new(&near.mesh, &near.rest, &none, near.read(&uv), COLLAPSED, epsilon)?;
         let goes_on = clearing.round(&near.pinned, progress)?;
         near.write(&clearing.uv, &mut uv);
         epsilon = clearing.energy.epsilon;
@@ -101,6 +108,25 @@ pub(super) fn foldover_free_near(
     }
     // Some may be all but collapsed still.
     Ok(first_flip(mesh, &uv).is_none().then_some(uv))
+}
+
+/// Moves the vertices that are not pinned until every triangle, and every other half of a quad, is positive and not near to
+/// collapse, or as far on the way there as a fixed number of steps leads.
+pub(super) fn clear_with_halves(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    halves: &OtherHalves,
+    pinned: &[bool],
+    start: Vec<Point2<f64>>,
+    progress: &Progress,
+) -> Result<Vec<Point2<f64>>, StretchError> {
+    let mut clearing = Clearing::new(mesh, rest, halves, start, COLLAPSED, WIDE)?;
+    for _ in 0..MOST_ROUNDS {
+        if clearing.is_done() || !clearing.round(pinned, progress)? {
+            break;
+        }
+    }
+    Ok(clearing.uv)
 }
 
 /// When to give up.
@@ -137,12 +163,13 @@ impl<'a> Clearing<'a> {
     fn new(
         mesh: &'a TriMesh,
         rest: &[RestTriangle],
+        halves: &OtherHalves,
         uv: Vec<Point2<f64>>,
         least: f64,
         epsilon: f64,
     ) -> Result<Self, StretchError> {
         let (trial, direction) = (uv.clone(), vec![0.0; 2 * uv.len()]);
-        let (system, energy) = (ChartSystem::new(mesh, rest)?, FoldoverEnergy { epsilon });
+        let (system, energy) = (ChartSystem::new(mesh, rest, halves)?, FoldoverEnergy { epsilon });
         Ok(Self { mesh, system, uv, trial, direction, energy, least })
     }
 

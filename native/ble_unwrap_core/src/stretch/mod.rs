@@ -28,6 +28,7 @@ mod line_search;
 mod measure;
 mod neighbourhood;
 mod newton;
+mod other_halves;
 mod overlap;
 mod part_boundary;
 mod stitch;
@@ -35,6 +36,7 @@ mod system;
 #[cfg(test)]
 mod test_meshes;
 mod tutte;
+mod unbend;
 
 use nalgebra::Point2;
 use thiserror::Error;
@@ -50,6 +52,7 @@ pub use overlap::{BoundaryDefect, boundary_defect, boundary_is_simple, first_fli
 pub use part_boundary::{boundary_is_tangled, part_boundary};
 pub use stitch::stitch;
 pub use tutte::{TutteBoundary, tutte_embedding};
+pub use unbend::{Unbent, unbend};
 
 use crate::distortion::RestTriangle;
 use crate::linalg::SparseError;

@@ -12,6 +12,8 @@ pub(super) struct Neighbourhood {
     /// The vertices that must not move: those of a face outside.
     pub(super) pinned: Vec<bool>,
     vertices: Vec<VertexId>,
+    /// The face of the chart that each face is; ascending.
+    faces: Vec<FaceId>,
 }
 
 impl Neighbourhood {
@@ -36,7 +38,13 @@ impl Neighbourhood {
             rest: faces.iter().map(|f| rest[f.index()]).collect(),
             pinned: vertices.iter().map(at_edge).collect(),
             vertices,
+            faces,
         }
+    }
+
+    /// The face here that a face of the chart is, if it lies here.
+    pub(super) fn place(&self, f: FaceId) -> Option<FaceId> {
+        self.faces.binary_search(&f).ok().map(FaceId::new)
     }
 
     /// The neighbourhood's part of a map.

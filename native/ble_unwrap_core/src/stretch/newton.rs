@@ -6,6 +6,7 @@ use super::barrier::Barrier;
 use super::energy::StretchEnergy;
 use super::measure::{plane_area, surface_area};
 use super::neighbourhood::Neighbourhood;
+use super::other_halves::OtherHalves;
 use super::overlap::{boundary_is_simple, first_flip};
 use super::system::{ChartSystem, advance};
 use super::{MinimiseOptions, Minimised, StretchError, StretchSettings};
@@ -68,7 +69,7 @@ pub(super) fn minimise(
     let energy = StretchEnergy::new(settings.dirichlet_weight);
     let warm = StretchEnergy::new(settings.dirichlet_weight.max(0.5));
     relax_worst(mesh, rest, &mut uv, &warm, options.keep_apart.is_some(), progress)?;
-    let mut descent = Descent::new(mesh, rest, uv, Vec::new(), options.keep_apart)?;
+    let mut descent = Descent::new(mesh, rest, &OtherHalves::default(), uv, Vec::new(), options.keep_apart)?;
     let mut result = Minimised {
         uv: Vec::new(),
         l2: 0.0,
@@ -149,7 +150,8 @@ fn relax_worst(
     // Where a border that moves would run over another it stays.
     let pins = if keep_apart { vec![&near.pinned, &border] } else { vec![&near.pinned] };
     for pinned in pins {
-        let mut descent = Descent::new(&near.mesh, &near.rest, near.read(uv), pinned.clone(), None)?;
+        let none = OtherHalves::default();
+        let mut descent = Descent::new(&near.mesh, &near.rest, &none, near.read(uv), pinned.clone(), None)?;
         for _ in 0..WORST_STEPS {
             progress.check()?;
             let Some((before, after)) = descent.step(&near.mesh, energy) else { break };
@@ -165,6 +167,29 @@ fn relax_worst(
         }
     }
     Ok(())
+}
+
+/// Lowers the energy of all triangles, the other halves of quads among them, from a map where they are all positive; none
+/// collapses. Pinned vertices stay.
+pub(super) fn relax_with_halves(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    halves: &OtherHalves,
+    pinned: &[bool],
+    start: Vec<Point2<f64>>,
+    settings: &StretchSettings,
+    progress: &Progress,
+) -> Result<Vec<Point2<f64>>, StretchError> {
+    let energy = StretchEnergy::new(settings.dirichlet_weight);
+    let mut descent = Descent::new(mesh, rest, halves, start, pinned.to_vec(), None)?;
+    for _ in 0..settings.max_iterations {
+        progress.check()?;
+        let Some((before, after)) = descent.step(mesh, &energy) else { break };
+        if before - after <= settings.tolerance * after {
+            break;
+        }
+    }
+    Ok(descent.uv)
 }
 
 /// Everything one Newton step works on.
@@ -183,13 +208,14 @@ impl<'a> Descent<'a> {
     fn new(
         mesh: &'a TriMesh,
         rest: &[RestTriangle],
+        halves: &OtherHalves,
         uv: Vec<Point2<f64>>,
         pinned: Vec<bool>,
         keep_apart: Option<f64>,
     ) -> Result<Self, StretchError> {
         let barrier = keep_apart.map(|reach| Barrier::new(mesh, rest, reach));
         let (trial, direction) = (uv.clone(), vec![0.0; 2 * uv.len()]);
-        Ok(Self { system: ChartSystem::new(mesh, rest)?, barrier, pinned, direction, uv, trial })
+        Ok(Self { system: ChartSystem::new(mesh, rest, halves)?, barrier, pinned, direction, uv, trial })
     }
 
     fn value(&self, energy: &StretchEnergy, uv: &[Point2<f64>]) -> f64 {
@@ -307,7 +333,8 @@ mod tests {
         let rest = RestTriangle::of_mesh(&mesh);
         let start = tutte(&mesh, &rest);
         for (keep, w) in [(None, 0.0), (None, 0.5), (Some(BOUNDARY_REACH), 0.05)] {
-            let mut descent = Descent::new(&mesh, &rest, start.clone(), Vec::new(), keep).expect("analysis");
+            let none = OtherHalves::default();
+            let mut descent = Descent::new(&mesh, &rest, &none, start.clone(), Vec::new(), keep).expect("analysis");
             let energy = StretchEnergy::new(w);
             let mut last = descent.value(&energy, &descent.uv);
             let mut steps = 0;

@@ -1,8 +1,11 @@
 //! The sum of an energy over the triangles of a chart: value, gradient, and Newton's linear system.
 
+use std::borrow::Cow;
+
 use nalgebra::{Matrix2, Point2, Vector2};
 
 use super::energy::{HatGradients, IsotropicEnergy, face_derivatives};
+use super::other_halves::OtherHalves;
 use crate::distortion::RestTriangle;
 use crate::linalg::{RoughCholesky, SparseError, SparsePattern};
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
@@ -19,9 +22,10 @@ const RIDGE_ATTEMPTS: usize = 7;
 /// is measured by the mean, to anything that counts.
 const PIN_STIFFNESS: f64 = 1e4;
 
-/// A chart's triangles with what an energy needs of each: hat gradients, and area weights, which sum to one.
+/// A chart's triangles with what an energy needs of each: hat gradients, and area weights, which sum to one. Behind the faces
+/// of the mesh come the halves that some of its quads have by their other diagonal, if any are asked for.
 pub(super) struct ChartFaces<'a> {
-    triangles: &'a [[VertexId; 3]],
+    triangles: Cow<'a, [[VertexId; 3]]>,
     hats: Vec<HatGradients>,
     weights: Vec<f64>,
 }
@@ -56,12 +60,18 @@ impl StretchSums {
 }
 
 impl<'a> ChartFaces<'a> {
-    fn new(mesh: &'a TriMesh, rest: &[RestTriangle]) -> Self {
-        let total: f64 = rest.iter().map(RestTriangle::area).sum();
+    fn new(mesh: &'a TriMesh, rest: &[RestTriangle], halves: &OtherHalves) -> Self {
+        let all = || rest.iter().chain(halves.rest());
+        let total: f64 = all().map(RestTriangle::area).sum();
+        let triangles = if halves.is_empty() {
+            Cow::Borrowed(mesh.triangles())
+        } else {
+            Cow::Owned([mesh.triangles(), halves.triangles()].concat())
+        };
         Self {
-            triangles: mesh.triangles(),
-            hats: rest.iter().map(HatGradients::new).collect(),
-            weights: rest.iter().map(|r| r.area() / total).collect(),
+            triangles,
+            hats: all().map(HatGradients::new).collect(),
+            weights: all().map(|r| r.area() / total).collect(),
         }
     }
 
@@ -102,7 +112,7 @@ impl<'a> ChartFaces<'a> {
     /// ever does. `uv` must have positive triangles.
     pub(super) fn first_flip(&self, uv: &[Point2<f64>], direction: &[f64]) -> f64 {
         let mut least = f64::INFINITY;
-        for t in self.triangles {
+        for t in self.triangles.iter() {
             let [p, q, r] = t.map(|v| uv[v.index()]);
             let along = |v: VertexId| Vector2::new(direction[2 * v.index()], direction[2 * v.index() + 1]);
             let [dp, dq, dr] = t.map(along);
@@ -122,18 +132,21 @@ impl<'a> ChartFaces<'a> {
 }
 
 impl<'a> ChartSystem<'a> {
-    /// Analyses the Hessian's pattern. O(n log n), a third of a factorisation.
-    pub(super) fn new(mesh: &'a TriMesh, rest: &[RestTriangle]) -> Result<Self, SparseError> {
-        let ends = |h: HalfedgeId| [mesh.from(h), mesh.to(h)].map(|v| v.index() as u32).into();
-        let solver = RoughCholesky::analyse(SparsePattern::from_pairs(mesh.vertex_count(), mesh.edges().map(ends)))?;
+    /// Analyses the Hessian's pattern. O(n log n), a third of a factorisation. The energy is summed over the other halves of
+    /// quads as well.
+    pub(super) fn new(mesh: &'a TriMesh, rest: &[RestTriangle], halves: &OtherHalves) -> Result<Self, SparseError> {
+        let faces = ChartFaces::new(mesh, rest, halves);
+        let pair = |ends: [VertexId; 2]| ends.map(|v| v.index() as u32).into();
+        let edges = mesh.edges().map(|h| [mesh.from(h), mesh.to(h)]).chain(halves.diagonals()).map(pair);
+        let solver = RoughCholesky::analyse(SparsePattern::from_pairs(mesh.vertex_count(), edges))?;
         let pattern = solver.pattern();
         let place = |v: VertexId, w: VertexId| {
             let (v, w) = (v.index(), w.index());
             pattern.position(2 * v.min(w), 2 * v.max(w)).map_or(u32::MAX, |p| p as u32)
         };
-        let across = mesh.triangles().iter().map(|&[a, b, c]| [place(a, b), place(b, c), place(c, a)]).collect();
+        let across = faces.triangles.iter().map(|&[a, b, c]| [place(a, b), place(b, c), place(c, a)]).collect();
         Ok(Self {
-            faces: ChartFaces::new(mesh, rest),
+            faces,
             across,
             base_diagonal: vec![0.0; pattern.size()],
             hessian: vec![0.0; pattern.entry_count()],
@@ -281,7 +294,7 @@ mod tests {
         let mesh = grid(4, 3, |x, y| Point3::new(x + 0.2 * y, y - 0.1 * x, 0.0));
         let rest = RestTriangle::of_mesh(&mesh);
         let energy = StretchEnergy::new(0.3);
-        let mut system = ChartSystem::new(&mesh, &rest).expect("analysis");
+        let mut system = ChartSystem::new(&mesh, &rest, &OtherHalves::default()).expect("analysis");
         let flat: Vec<_> = mesh.positions().iter().map(|p| p.xy()).collect();
         let bent: Vec<_> = flat.iter().map(|p| Point2::new(p.x + 0.1 * p.y * p.y, 1.2 * p.y)).collect();
         let h = 1e-6;
@@ -310,7 +323,7 @@ mod tests {
     fn the_first_flip_is_where_a_determinant_vanishes() {
         let mesh = hemisphere(6);
         let rest = RestTriangle::of_mesh(&mesh);
-        let faces = ChartFaces::new(&mesh, &rest);
+        let faces = ChartFaces::new(&mesh, &rest, &OtherHalves::default());
         let circle = crate::stretch::TutteBoundary::Circle;
         let uv = crate::stretch::tutte_embedding(&mesh, &rest, circle, &crate::progress::Progress::new());
         let uv = uv.expect("solver").expect("positive");
