@@ -97,16 +97,15 @@ pub(crate) fn counted(count: usize, [one, many]: [&str; 2]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Progress;
+    use crate::metrics::{Texture, UvMesh, measure};
+    use nalgebra::Point3;
 
     #[test]
     fn one_is_singular() {
         let words = ["chart exceeds", "charts exceed"];
         assert_eq!([0, 1, 2].map(|n| counted(n, words)), ["0 charts exceed", "1 chart exceeds", "2 charts exceed"]);
     }
-
-    use crate::Progress;
-    use crate::metrics::{Texture, UvMesh, measure};
-    use nalgebra::Point3;
 
     #[test]
     fn charts_over_the_limit_are_listed_once() {
