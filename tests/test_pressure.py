@@ -1,9 +1,11 @@
 """What the native module does when memory is short, when a measure cannot be had, and when results travel."""
 
 import copy
+import importlib.util
 import pickle
 import subprocess
 import sys
+from pathlib import Path
 
 import ble_unwrap_native as native
 import numpy as np
@@ -94,6 +96,27 @@ def test_many_small_charts_have_a_worst():
     corners = np.arange(3 * count, dtype=np.int32)
     report = unwrap(positions.reshape(-1, 3), corners, [*corners[::3].tolist(), 3 * count], texture_size=4096, margin=0)
     assert report["charts"] == count and np.isfinite(report["l2_worst_chart"])
+
+
+def add_on_engine():
+    """The add-on's judge, which needs no Blender."""
+    spec = importlib.util.spec_from_file_location("engine", Path(__file__).parent.parent / "addon/engine.py")
+    engine = importlib.util.module_from_spec(spec)
+    sys.modules["engine"] = engine
+    spec.loader.exec_module(engine)
+    return engine
+
+
+def test_what_could_not_be_measured_is_no_pass():
+    engine = add_on_engine()
+    good = {"charts": 2, "gap_texels": 4.0, "l2_worst_chart": 1.05, "l2_chart_scale": 1.05}
+    for over in ("CHART", "ATLAS"):
+        judged = {"margin": 4, "stretch_limit": 1.1, "limit_over": over}
+        assert engine.certify(good, **judged).holds
+        for name in ("l2_worst_chart", "l2_chart_scale", "gap_texels"):
+            violations = engine.certify(good | {name: float("nan")}, **judged).violations
+            counts = name == "gap_texels" or (name == "l2_chart_scale") == (over == "ATLAS")
+            assert len(violations) == counts, (over, name, violations)
 
 
 # Results that travel ------------------------------------------------------------------------------------------------
