@@ -110,7 +110,8 @@ mod tests {
     #[test]
     fn quads_are_found_among_other_polygons() {
         // A quad, a triangle and a pentagon in a row.
-        let p = [(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (3, 0), (4, 0), (3, 1)].map(|(x, y)| at(f64::from(x), f64::from(y), 0.0));
+        let p = [(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (3, 0), (4, 0), (3, 1)]
+            .map(|(x, y)| at(f64::from(x), f64::from(y), 0.0));
         let triangles = [[0, 1, 2], [0, 2, 3], [1, 4, 2], [2, 4, 5], [2, 5, 7], [5, 6, 7]];
         let (mesh, _) = TriMesh::from_triangles(&p, &triangles);
         let quads: Vec<Quad> = Quad::all(&mesh, &[0, 0, 1, 2, 2, 2]).collect();

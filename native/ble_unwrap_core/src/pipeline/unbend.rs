@@ -1,12 +1,13 @@
 //! Quads bent in the plane are made convex again, before charts are packed.
 
+use nalgebra::Point2;
 use rayon::prelude::*;
 
 use crate::charts::Chart;
 use crate::distortion::{self, RestTriangle};
 use crate::mesh::{Quad, VertexId};
 use crate::progress::Cancelled;
-use crate::settings::Settings;
+use crate::settings::{LimitOver, Settings};
 use crate::stretch::{self, StretchError};
 
 use super::flatten;
@@ -20,8 +21,9 @@ pub(super) fn unbend(
     rungs: &mut Rungs,
     progress: &Run<'_>,
 ) -> Result<Vec<Chart>, Cancelled> {
+    let rise = affordable_rise(&charts, settings);
     let mended: Vec<Result<(Chart, bool), Cancelled>> =
-        charts.into_par_iter().map(|chart| unbent(chart, settings, progress)).collect();
+        charts.into_par_iter().map(|chart| unbent(chart, rise, settings, progress)).collect();
     let mut charts = Vec::with_capacity(mended.len());
     for chart in mended {
         let (chart, has_changed) = chart?;
@@ -33,18 +35,35 @@ pub(super) fn unbend(
     Ok(charts)
 }
 
-/// A chart, and whether it was bent.
-fn unbent(chart: Chart, settings: &Settings, progress: &Run<'_>) -> Result<(Chart, bool), Cancelled> {
-    if std::env::var_os("QUADS_OFF").is_some() { return Ok((chart, false)); }
+/// By how much the stretch of every chart may rise for a limit over the atlas to hold; without end where there is none.
+fn affordable_rise(charts: &[Chart], settings: &Settings) -> f64 {
+    if settings.limit_over == LimitOver::Chart {
+        return f64::INFINITY;
+    }
+    let (mut stretch, mut area) = (0.0, 0.0);
+    for chart in charts {
+        let share = chart.patch.area();
+        stretch += share * chart.l2;
+        area += share;
+    }
+    // NaN, of no area, is none.
+    (settings.stretch_limit - stretch / area).max(0.0)
+}
+
+/// A chart, and whether it was bent. A chart under its limit stays under it; of one that is over it no more is asked.
+fn unbent(chart: Chart, rise: f64, settings: &Settings, progress: &Run<'_>) -> Result<(Chart, bool), Cancelled> {
     let mesh = &chart.patch.mesh;
     let quads: Vec<Quad> = Quad::all(mesh, &chart.patch.polygon).filter(|q| q.is_convex(mesh)).collect();
+    if quads.is_empty() {
+        return Ok((chart, false));
+    }
     let rest = RestTriangle::of_mesh(mesh);
-    match stretch::unbend(mesh, &rest, quads, &chart.uv, &settings.stretch, progress) {
+    let l2 = |uv: &[Point2<f64>]| flatten::l2(&chart.patch, &rest, uv);
+    let limit = settings.chart_limit();
+    let is_allowed = |uv: &[Point2<f64>]| (chart.l2 > limit || l2(uv) <= limit) && l2(uv) <= chart.l2 + rise;
+    match stretch::unbend(mesh, &rest, &quads, &chart.uv, &is_allowed, &settings.stretch, progress) {
         Ok(Some(better)) => {
-            let l2 = flatten::l2(&chart.patch, &rest, &better.uv);
-            if std::env::var_os("QUADS_DEBUG").is_some() {
-                eprintln!("unbend {} faces: left {} l2 {} -> {l2}", mesh.face_count(), better.left, chart.l2);
-            }
+            let l2 = l2(&better.uv);
             Ok((Chart { uv: better.uv, l2, ..chart }, true))
         }
         Err(StretchError::Cancelled(c)) => Err(c),

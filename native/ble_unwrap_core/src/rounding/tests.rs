@@ -3,6 +3,7 @@
 use nalgebra::Point3;
 
 use super::*;
+use crate::mesh::Quad;
 use crate::metrics::{Texture, UvMesh};
 use crate::progress::Progress;
 use crate::verify;
@@ -133,4 +134,52 @@ fn results_stay_in_the_unit_square() {
         assert!(all_positive(&mesh, &r.uv) && is_injective(&mesh, &r.uv));
         assert!(r.uv.iter().flatten().all(|x| (0.0..=1.0).contains(x)));
     }
+}
+
+/// Flat quads side by side, each with a corner that lies only `depth` beyond the other diagonal: all but bent.
+fn nearly_bent(n: u32, depth: f64) -> (TriMesh, Vec<Point2<f64>>, Vec<[VertexId; 3]>) {
+    let mut p = Vec::new();
+    for k in 0..n {
+        // A kite: its first and third corner are the ends of the diagonal that is there.
+        let (x, y) = (1.1 * f64::from(k), 0.37 * f64::from(k));
+        p.extend(
+            [[0.5 - depth, 0.5 - depth], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+                .map(|q| Point3::new(x + q[0], y + q[1], 0.0)),
+        );
+    }
+    let triangles: Vec<[u32; 3]> =
+        (0..n).flat_map(|k| [[4 * k, 4 * k + 1, 4 * k + 2], [4 * k, 4 * k + 2, 4 * k + 3]]).collect();
+    let (mesh, _) = TriMesh::from_triangles(&p, &triangles);
+    let polygon: Vec<u32> = mesh.faces().map(|f| f.index() as u32 / 2).collect();
+    let halves = Quad::all(&mesh, &polygon).flat_map(|q| q.other_halves(&mesh)).collect();
+    let uv = mesh.positions().iter().map(|p| Point2::new(p.x, p.y)).collect();
+    (mesh, uv, halves)
+}
+
+#[test]
+fn quads_that_plain_rounding_bends_are_mended() {
+    let (mesh, uv, halves) = nearly_bent(60, 1e-7);
+    let uv = placed(&uv, 0.007, [0.51, 0.53]);
+    let turned = |uv: &[[f32; 2]]| {
+        let is_turned = |t: &&[VertexId; 3]| {
+            let [a, b, c] = t.map(|v| uv[v.index()]);
+            double_area(a, b, c) <= 0.0
+        };
+        halves.iter().filter(is_turned).count()
+    };
+    let plain = round_to_f32(&mesh, &[], &uv, &ROUNDING).expect("nothing to mend");
+    let kept = round_to_f32(&mesh, &halves, &uv, &ROUNDING).expect("no face is lost");
+    assert_eq!(plain.moved, 0);
+    assert!(turned(&plain.uv) > 10, "{}", turned(&plain.uv));
+    assert_eq!(turned(&kept.uv), 0);
+    assert!(all_positive(&mesh, &kept.uv) && kept.moved > 0);
+}
+
+#[test]
+fn no_face_is_given_up_for_a_bent_quad() {
+    // Bent by far more than rounding may move a vertex.
+    let (mesh, uv, halves) = nearly_bent(3, -0.2);
+    let uv = placed(&uv, 0.1, [0.1, 0.2]);
+    let kept = round_to_f32(&mesh, &halves, &uv, &ROUNDING).expect("no face is lost");
+    assert!(all_positive(&mesh, &kept.uv));
 }

@@ -14,7 +14,7 @@ use super::other_halves::OtherHalves;
 use super::overlap::first_flip;
 use super::system::{ChartSystem, advance};
 use crate::distortion::RestTriangle;
-use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::mesh::{FaceId, TriMesh};
 use crate::progress::Progress;
 
 /// Newton steps in a round,
@@ -62,12 +62,7 @@ pub(super) fn foldover_free(
 
 /// Whether a triangle is flipped or so nearly collapsed that Newton's steps would end there.
 pub(super) fn is_collapsed(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>], f: FaceId) -> bool {
-    is_triangle_collapsed(&rest[f.index()], mesh.triangle(f), uv)
-}
-
-/// The same of a triangle that need not be a face.
-pub(super) fn is_triangle_collapsed(rest: &RestTriangle, triangle: [VertexId; 3], uv: &[Point2<f64>]) -> bool {
-    rest.jacobian(triangle.map(|v| uv[v.index()])).determinant() < COLLAPSED
+    rest[f.index()].jacobian(mesh.triangle(f).map(|v| uv[v.index()])).determinant() < COLLAPSED
 }
 
 /// Number of such triangles.

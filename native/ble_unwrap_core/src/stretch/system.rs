@@ -62,17 +62,16 @@ impl StretchSums {
 impl<'a> ChartFaces<'a> {
     fn new(mesh: &'a TriMesh, rest: &[RestTriangle], halves: &OtherHalves) -> Self {
         let all = || rest.iter().chain(halves.rest());
-        let total: f64 = all().map(RestTriangle::area).sum();
+        let mut weights: Vec<f64> = all().map(RestTriangle::area).collect();
+        weights[rest.len()..].iter_mut().for_each(|w| *w *= halves.weight());
+        let total: f64 = weights.iter().sum();
+        weights.iter_mut().for_each(|w| *w /= total);
         let triangles = if halves.is_empty() {
             Cow::Borrowed(mesh.triangles())
         } else {
             Cow::Owned([mesh.triangles(), halves.triangles()].concat())
         };
-        Self {
-            triangles,
-            hats: all().map(HatGradients::new).collect(),
-            weights: all().map(|r| r.area() / total).collect(),
-        }
+        Self { triangles, hats: all().map(HatGradients::new).collect(), weights }
     }
 
     #[inline]

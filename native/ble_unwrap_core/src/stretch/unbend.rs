@@ -19,6 +19,11 @@ use crate::progress::Progress;
 
 /// So many rings round the bent quads move; more only where that was too narrow.
 const RINGS: [usize; 3] = [2, 5, 12];
+/// What the other halves count beside the faces, area by area: at first as much, and less where that takes a chart over
+/// its limit.
+const WEIGHTS: [f64; 3] = [1.0, 0.1, 0.01];
+/// Where all bent quads together do so still, so many at most are mended one by one.
+const MOST_SINGLY: usize = 64;
 
 /// A map whose quads are less bent.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,10 +34,12 @@ pub struct Unbent {
     pub left: usize,
 }
 
-/// Moves the vertices near quads that are convex on the surface and bent in the plane, until they are convex there, too.
+/// Moves the vertices near quads that are convex on the surface and bent in the plane, until they are convex there, too. Quads
+/// that are all but bent, one of their halves by the other diagonal being stretched far more than the faces there, are relaxed.
 ///
-/// `start` must be without flips and have a simple boundary; so has the result, by exact tests, and it has fewer bent quads.
-/// `None` where no quad is bent, or none can be mended. O(n) where none is; else what lies around them is minimised anew.
+/// `start` must be without flips and have a simple boundary; so has the result, by exact tests, and it has no more bent quads.
+/// `is_allowed` tells of a map whether it may be had: whether its stretch is under a limit. `None` where there is nothing to
+/// mend, or it may not be. O(n) where there is nothing; else what lies around is minimised anew.
 ///
 /// # Errors
 /// [`StretchError::Solver`], [`StretchError::Cancelled`].
@@ -42,8 +49,9 @@ pub struct Unbent {
 pub fn unbend(
     mesh: &TriMesh,
     rest: &[RestTriangle],
-    quads: Vec<Quad>,
+    quads: &[Quad],
     start: &[Point2<f64>],
+    is_allowed: &dyn Fn(&[Point2<f64>]) -> bool,
     settings: &StretchSettings,
     progress: &Progress,
 ) -> Result<Option<Unbent>, StretchError> {
@@ -56,57 +64,194 @@ pub fn unbend(
     let mut uv = start.to_vec();
     let scale = (surface_area(rest) / plane_area(mesh, &uv)).sqrt();
     rescale(mesh, &mut uv, scale, true);
-    let before = halves.bent(&uv).len();
-    let mut left = before;
-    for rings in RINGS {
-        if left == 0 {
-            break;
+    if halves.crowded(mesh, rest, &uv).is_empty() {
+        return Ok(None);
+    }
+    let bent = halves.bent(&uv);
+    let found = |uv: Vec<Point2<f64>>| Some(Unbent { left: halves.bent(&uv).len(), uv });
+    let mut mending = Mending { mesh, rest, halves: halves.clone(), settings, progress };
+    for weight in WEIGHTS {
+        mending.halves = halves.weighing(weight);
+        let all = |uv: &[Point2<f64>]| halves.crowded(mesh, rest, uv);
+        let Some(mended) = mending.mend(&uv, &all)? else { continue };
+        if is_allowed(&mended) {
+            return Ok(found(mended));
         }
-        if let Some(better) = mend(mesh, rest, &halves, &uv, rings, settings, progress)? {
-            left = halves.bent(&better).len();
-            uv = better;
+        // Nothing less will do for these.
+        let settled = if weight == WEIGHTS[2] { mending.settle(&mended)? } else { None };
+        if let Some(settled) = settled.filter(|uv| is_allowed(uv)) {
+            return Ok(found(settled));
         }
     }
-    Ok((left < before).then_some(Unbent { uv, left }))
+    // What can be had of them.
+    let mut best = None;
+    for &quad in bent.iter().take(MOST_SINGLY) {
+        let from = best.as_ref().unwrap_or(&uv);
+        let this = |uv: &[Point2<f64>]| if halves.is_bent(quad, uv) { vec![quad] } else { Vec::new() };
+        best = mending.mend(from, &this)?.filter(|uv| is_allowed(uv)).or(best);
+    }
+    Ok(best.and_then(found))
 }
 
-/// Mends the neighbourhoods of all bent quads at once; `None` where fewer are not left.
-fn mend(
-    mesh: &TriMesh,
-    rest: &[RestTriangle],
-    halves: &OtherHalves,
-    uv: &[Point2<f64>],
-    rings: usize,
-    settings: &StretchSettings,
-    progress: &Progress,
-) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
-    let bent = halves.bent(uv);
-    let mut bad = vec![false; mesh.face_count()];
-    for quad in bent.iter().map(|&k| halves.quads()[k]) {
-        for h in [quad.diagonal, mesh.twin(quad.diagonal)] {
-            bad[h.face().index()] = true;
+/// What mending works on.
+struct Mending<'a> {
+    mesh: &'a TriMesh,
+    rest: &'a [RestTriangle],
+    halves: OtherHalves,
+    settings: &'a StretchSettings,
+    progress: &'a Progress,
+}
+
+impl Mending<'_> {
+    /// Mends the quads that `bad` finds in a map, until it finds no more; `None` where it finds as many as before.
+    fn mend(
+        &self,
+        uv: &[Point2<f64>],
+        bad: &dyn Fn(&[Point2<f64>]) -> Vec<usize>,
+    ) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
+        let mut best = None;
+        for rings in RINGS {
+            let from = best.as_deref().unwrap_or(uv);
+            let quads = bad(from);
+            if quads.is_empty() {
+                break;
+            }
+            let is_better = |uv: &[Point2<f64>]| bad(uv).len() < quads.len();
+            best = self.mend_near(from, &quads, rings, &is_better)?.or(best);
+        }
+        Ok(best)
+    }
+
+    /// Mends the neighbourhoods of some quads, all at once.
+    fn mend_near(
+        &self,
+        uv: &[Point2<f64>],
+        quads: &[usize],
+        rings: usize,
+        is_better: &dyn Fn(&[Point2<f64>]) -> bool,
+    ) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
+        let mut bad = vec![false; self.mesh.face_count()];
+        for quad in quads.iter().map(|&k| self.halves.quads()[k]) {
+            for h in [quad.diagonal, self.mesh.twin(quad.diagonal)] {
+                bad[h.face().index()] = true;
+            }
+        }
+        let near = Neighbourhood::new(self.mesh, self.rest, &bad, rings);
+        let within = self.halves.part(self.mesh, &near);
+        let border: Vec<bool> =
+            near.mesh.vertices().map(|v| near.pinned[v.index()] || near.mesh.is_boundary_vertex(v)).collect();
+        let bent = self.halves.bent(uv).len();
+        // Where a border that moves would run over another it stays.
+        for pinned in [&near.pinned, &border] {
+            // Cleared by what both diagonals ask for alike, whatever they count afterwards.
+            let alike = within.weighing(1.0);
+            let cleared = clear_with_halves(&near.mesh, &near.rest, &alike, pinned, near.read(uv), self.progress)?;
+            if first_flip(&near.mesh, &cleared).is_some() {
+                continue;
+            }
+            let kept = within.without_bent(&cleared);
+            let relaxed =
+                relax_with_halves(&near.mesh, &near.rest, &kept, pinned, cleared, self.settings, self.progress)?;
+            let mut moved = uv.to_vec();
+            near.write(&relaxed, &mut moved);
+            if first_flip(self.mesh, &moved).is_none()
+                && self.halves.bent(&moved).len() <= bent
+                && is_better(&moved)
+                && boundary_is_simple(self.mesh, &moved)
+            {
+                return Ok(Some(moved));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The whole map with less stretch, its quads as they are: by the plain stretch, since every bit counts here.
+    fn settle(&self, uv: &[Point2<f64>]) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
+        let kept = self.halves.without_bent(uv);
+        let plain = StretchSettings { dirichlet_weight: 0.0, ..self.settings.clone() };
+        let settled = relax_with_halves(self.mesh, self.rest, &kept, &[], uv.to_vec(), &plain, self.progress)?;
+        let is_good = first_flip(self.mesh, &settled).is_none()
+            && self.halves.bent(&settled).len() <= self.halves.bent(uv).len()
+            && boundary_is_simple(self.mesh, &settled);
+        Ok(is_good.then_some(settled))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stretch::minimise_stretch;
+    use crate::stretch::test_meshes::grid;
+    use nalgebra::{Point3, Vector2};
+
+    /// A flat sheet, its quads, and where its vertices are.
+    fn sheet(n: usize) -> (TriMesh, Vec<Quad>, Vec<Point2<f64>>) {
+        let mesh = grid(n, n, |x, y| Point3::new(x, y, 0.0));
+        let polygon: Vec<u32> = mesh.faces().map(|f| f.index() as u32 / 2).collect();
+        let quads: Vec<Quad> = Quad::all(&mesh, &polygon).collect();
+        assert_eq!(quads.len(), n * n);
+        let flat = mesh.positions().iter().map(|p| p.xy()).collect();
+        (mesh, quads, flat)
+    }
+
+    /// The map with the vertex at (x, y) pushed by `by` along both axes.
+    fn pushed(flat: &[Point2<f64>], x: f64, y: f64, by: f64) -> Vec<Point2<f64>> {
+        let moved = |p: &Point2<f64>| if *p == Point2::new(x, y) { p + Vector2::new(by, by) } else { *p };
+        flat.iter().map(moved).collect()
+    }
+
+    fn bent(mesh: &TriMesh, quads: &[Quad], uv: &[Point2<f64>]) -> usize {
+        OtherHalves::new(mesh, quads).bent(uv).len()
+    }
+
+    #[test]
+    fn a_bent_quad_becomes_convex_and_the_rest_stays() {
+        let (mesh, quads, flat) = sheet(24);
+        let rest = RestTriangle::of_mesh(&mesh);
+        // Inside, at the border and in a corner of the sheet: over the middle of the quad, whose own diagonal it lies on.
+        for (x, y) in [(4.0, 4.0), (4.0, 0.0), (0.0, 0.0)] {
+            let start = pushed(&flat, x, y, 0.6);
+            assert_eq!((bent(&mesh, &quads, &start), first_flip(&mesh, &start)), (1, None), "nothing to mend");
+            let settings = StretchSettings::default();
+            let got = unbend(&mesh, &rest, &quads, &start, &|_| true, &settings, &Progress::new()).expect("runs");
+            let got = got.expect("a mended map");
+            assert_eq!((got.left, bent(&mesh, &quads, &got.uv)), (0, 0));
+            assert!(first_flip(&mesh, &got.uv).is_none() && boundary_is_simple(&mesh, &got.uv));
+            let far = |p: &Point2<f64>| p.x > 16.0 || p.y > 16.0;
+            let scale = got.uv[24].x / start[24].x;
+            assert!((scale - 1.0).abs() < 1e-3);
+            let stays = |(p, q): (&Point2<f64>, &Point2<f64>)| !far(p) || (p * scale - q).norm() < 1e-9;
+            assert!(start.iter().zip(&got.uv).all(stays));
         }
     }
-    let near = Neighbourhood::new(mesh, rest, &bad, rings);
-    let within = halves.part(mesh, &near);
-    let border: Vec<bool> =
-        near.mesh.vertices().map(|v| near.pinned[v.index()] || near.mesh.is_boundary_vertex(v)).collect();
-    // Where a border that moves would run over another it stays.
-    for pinned in [&near.pinned, &border] {
-        let cleared = clear_with_halves(&near.mesh, &near.rest, &within, pinned, near.read(uv), progress)?;
-        if first_flip(&near.mesh, &cleared).is_some() {
-            continue;
+
+    #[test]
+    fn a_map_without_bent_quads_is_left_alone() {
+        let (mesh, quads, flat) = sheet(6);
+        let rest = RestTriangle::of_mesh(&mesh);
+        let settings = StretchSettings::default();
+        for start in [flat.clone(), pushed(&flat, 2.0, 2.0, 0.2)] {
+            let got = unbend(&mesh, &rest, &quads, &start, &|_| true, &settings, &Progress::new());
+            assert_eq!(got, Ok(None));
         }
-        let kept = within.without_bent(&cleared);
-        let relaxed = relax_with_halves(&near.mesh, &near.rest, &kept, pinned, cleared, settings, progress)?;
-        let mut moved = uv.to_vec();
-        near.write(&relaxed, &mut moved);
-        if first_flip(mesh, &moved).is_none()
-            && halves.bent(&moved).len() < bent.len()
-            && boundary_is_simple(mesh, &moved)
-        {
-            return Ok(Some(moved));
-        }
+        assert_eq!(unbend(&mesh, &rest, &[], &flat, &|_| true, &settings, &Progress::new()), Ok(None));
     }
-    Ok(None)
+
+    #[test]
+    fn many_bent_quads_are_mended_at_once_and_cost_no_stretch() {
+        let (mesh, quads, flat) = sheet(12);
+        let rest = RestTriangle::of_mesh(&mesh);
+        let start: Vec<_> = (0..3).fold(flat, |uv, k| {
+            let at = f64::from(2 + 4 * k);
+            (0..3).fold(uv, |uv, l| pushed(&uv, at, f64::from(2 + 4 * l), 0.7))
+        });
+        assert_eq!(bent(&mesh, &quads, &start), 9);
+        let settings = StretchSettings::default();
+        let got = unbend(&mesh, &rest, &quads, &start, &|_| true, &settings, &Progress::new()).expect("runs");
+        let got = got.expect("a mended map");
+        assert_eq!(got.left, 0);
+        let least = minimise_stretch(&mesh, &rest, &got.uv, &settings, &Default::default(), &Progress::new());
+        let l2 = crate::stretch::l2_stretch(&mesh, &rest, &got.uv);
+        assert!(l2 < 1.001 * least.expect("runs").l2, "{l2}");
+    }
 }

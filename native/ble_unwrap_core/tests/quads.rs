@@ -1,0 +1,141 @@
+//! Quads that are convex on the surface are convex in UV, so that a result holds by either diagonal.
+
+use ble_unwrap_core::metrics::{Measures, Texture, UvMesh};
+use ble_unwrap_core::standalone::measure_layout;
+use ble_unwrap_core::{Atlas, MeshInput, Progress, Settings, unwrap, verify};
+use ble_unwrap_fixtures::{FlatPolygons, PolyMesh, random, voxels, wrapped_grid};
+use nalgebra::Point3;
+use rayon::ThreadPoolBuilder;
+
+fn input_of<'a>(mesh: &'a PolyMesh, flat: &'a FlatPolygons) -> MeshInput<'a> {
+    MeshInput {
+        positions: &mesh.positions,
+        corner_vertices: &flat.corner_vertices,
+        face_offsets: &flat.face_offsets,
+        ..MeshInput::default()
+    }
+}
+
+fn unwrapped(mesh: &PolyMesh) -> Atlas {
+    let flat = mesh.flat();
+    unwrap(&input_of(mesh, &flat), &Settings::default(), &Progress::new()).expect("unwraps")
+}
+
+/// Each vertex halfway to the mean of its neighbours, so many times.
+fn smoothed(mut mesh: PolyMesh, rounds: usize) -> PolyMesh {
+    for _ in 0..rounds {
+        let mut sums = vec![([0.0; 3], 0.0); mesh.positions.len()];
+        for face in &mesh.faces {
+            for (k, &v) in face.iter().enumerate() {
+                let next = mesh.positions[face[(k + 1) % face.len()] as usize];
+                let (sum, count) = &mut sums[v as usize];
+                *count += 1.0;
+                (0..3).for_each(|k| sum[k] += next[k]);
+            }
+        }
+        for (p, (sum, count)) in mesh.positions.iter_mut().zip(sums) {
+            (0..3).for_each(|k| p[k] = 0.5 * p[k] + 0.5 * sum[k] / count);
+        }
+    }
+    mesh
+}
+
+/// Two balls of cubes that have grown together.
+fn voxel_blob(size: usize) -> PolyMesh {
+    voxels([size; 3], |cell| {
+        let near = |centre: [f64; 3], radius: f64| {
+            let square: f64 = (0..3).map(|k| (cell[k] as f64 + 0.5 - centre[k] * size as f64).powi(2)).sum();
+            square < (radius * size as f64).powi(2)
+        };
+        near([0.35, 0.4, 0.4], 0.3) || near([0.62, 0.6, 0.55], 0.27)
+    })
+}
+
+/// A square tower, each storey turned against the one below, so that its quads are warped.
+fn twisted_tower(storeys: usize, turn: f64) -> PolyMesh {
+    let corner = |u: f64| [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]][(4.0 * u) as usize % 4];
+    wrapped_grid(12, storeys, [true, false], |u, v| {
+        let along = 4.0 * u - (4.0 * u).floor();
+        let (a, b) = (corner(u), corner(u + 0.25));
+        let [x, y] = [0, 1].map(|k| a[k] + along * (b[k] - a[k]));
+        let (sin, cos) = (turn * storeys as f64 * v).sin_cos();
+        [cos * x - sin * y, sin * x + cos * y, 0.5 * storeys as f64 * v]
+    })
+}
+
+/// Hills so steep and rough that quads crowd.
+fn rough_hills(n: usize) -> PolyMesh {
+    ble_unwrap_fixtures::grid(n, n, |u, v| {
+        let at = (u * n as f64).round() as u64 * 1000 + (v * n as f64).round() as u64;
+        [u, v, 0.6 / n as f64 * random(5, at) + 0.3 * (9.0 * u).sin() * (7.0 * v).cos()]
+    })
+}
+
+fn shapes() -> [(&'static str, PolyMesh); 5] {
+    [
+        ("voxel blob", voxel_blob(10)),
+        ("voxel blob with smooth corners", smoothed(voxel_blob(14), 2)),
+        ("twisted tower", twisted_tower(10, 0.35)),
+        ("rough hills", rough_hills(24)),
+        ("a tower of few quads", twisted_tower(6, 0.5)),
+    ]
+}
+
+/// All faces as triangles, by corner: quads by the diagonal from their corner number `first`.
+fn triangulated(mesh: &PolyMesh, first: usize) -> Vec<[i32; 3]> {
+    let mut out = Vec::new();
+    let mut begin = 0;
+    for face in &mesh.faces {
+        let corner = |k: usize| (begin + (first + k) % face.len()) as i32;
+        out.extend((2..face.len()).map(|k| [corner(0), corner(k - 1), corner(k)]));
+        begin += face.len();
+    }
+    out
+}
+
+/// Measured with these triangles, and proven to be free of flips and overlap with them.
+fn measured(mesh: &PolyMesh, atlas: &Atlas, triangles: &[[i32; 3]], name: &str) -> Measures {
+    let flat = mesh.flat();
+    let positions: Vec<Point3<f64>> = mesh.positions.iter().map(|&p| Point3::from(p)).collect();
+    let by_corner: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|c| c as u32)).collect();
+    let by_vertex: Vec<[u32; 3]> =
+        by_corner.iter().map(|t| t.map(|c| flat.corner_vertices[c as usize] as u32)).collect();
+    let first_corners = &flat.face_offsets;
+    let face_of = |c: u32| first_corners.partition_point(|&f| f <= c as i32) - 1;
+    let chart: Vec<i32> = by_corner.iter().map(|t| atlas.chart[face_of(t[0])]).collect();
+    let texture = Texture::square(2048, 4.0);
+    let uv_mesh = UvMesh::new(&positions, &by_vertex, &atlas.uv, &by_corner, &chart, texture).expect("valid arrays");
+    let certificate = verify(&uv_mesh, &[], &Progress::new()).expect("not cancelled");
+    assert!(certificate.is_valid(), "{name}: {certificate:?}");
+    let input = MeshInput { corner_triangles: Some(triangles), ..input_of(mesh, &flat) };
+    let layout = measure_layout(&input, &atlas.uv, None, texture, &Progress::new()).expect("measures");
+    assert_eq!((layout.bent_quads, layout.unmapped_faces), (0, 0), "{name}");
+    layout.measures
+}
+
+#[test]
+fn results_hold_by_either_diagonal() {
+    let mut mended = 0;
+    for (name, mesh) in shapes() {
+        let atlas = unwrapped(&mesh);
+        assert_eq!(atlas.report.bent_quads, 0, "{name}");
+        let [one, other] = [0, 1].map(|first| measured(&mesh, &atlas, &triangulated(&mesh, first), name));
+        assert_eq!((one.flips, other.flips, one.overlaps, other.overlaps), (0, 0, 0, 0), "{name}");
+        println!("{name}: l2 {} by one diagonal, {} by the other; {:?}", one.l2, other.l2, atlas.report.rungs);
+        mended += atlas.report.rungs.iter().filter(|rung| rung.0 == "unbend").map(|rung| rung.1).sum::<usize>();
+    }
+    assert!(mended > 0, "no quad had to be mended: no test");
+}
+
+#[test]
+fn threads_change_nothing() {
+    for (name, mesh) in shapes() {
+        let with = |threads: usize| {
+            let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let bits: Vec<u32> = pool.install(|| unwrapped(&mesh)).uv.iter().flatten().map(|x| x.to_bits()).collect();
+            bits
+        };
+        let first = with(1);
+        assert!(with(2) == first && with(8) == first, "{name}");
+    }
+}
