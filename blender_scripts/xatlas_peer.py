@@ -19,8 +19,8 @@ import numpy as np
 
 # Name of the variable that holds a directory with xatlas, where it is not among the packages of this Python.
 LIBRARY = "BLE_XATLAS_LIBRARY"
-# Seconds after which it is given up: a hundred times what it takes for the largest mesh of the demonstration.
-TIMEOUT = 900
+# Seconds after which it is given up: several times what it takes for the 110,592 triangles of the demonstration.
+TIMEOUT = 300
 NOT_INSTALLED = 3  # exit code of the process
 
 
