@@ -86,9 +86,13 @@ def test_faces_that_are_a_segment_follow_a_neighbour():
             assert (uv[corner] == uv[:128][corners[:128] == corners[corner]]).all(axis=1).any()
 
 
-@pytest.mark.parametrize(("size", "offset"), [(1, 0), (1e-3, 0), (1e3, 0), (1, 1000), (1e-3, 1)])
-def test_last_digits_weld_at_any_size_and_place(size, offset):
-    positions, corners, offsets = soup()
+# Far from the origin single precision has longer steps: 6e-5 at 1000.
+@pytest.mark.parametrize(
+    ("size", "offset", "noise"),
+    [(1, 0, 1e-7), (1e-3, 0, 1e-7), (1e3, 0, 1e-7), (1, 1000, 1e-5), (1e-3, 1, 1e-5)],
+)
+def test_last_digits_weld_at_any_size_and_place(size, offset, noise):
+    positions, corners, offsets = soup(noise)
     placed = turned(positions, size, offset).astype(np.float32)
     together = unwrap(placed, corners, offsets, weld=True).report
     assert (together["charts"], together["seam_length"]) == (1, 0)

@@ -142,8 +142,9 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 ///     Whether vertices at the same position count as one. Only the charts see it; the mesh stays as it is.
 /// weld_distance : float, at least 0, or None
 ///     How near to each other such vertices are, in the unit of ``positions``: 0 for exactly the same coordinates, ``None``
-///     for what single precision cannot tell apart, which is 2**-21 of the larger of the greatest coordinate and the
-///     diagonal of the bounding box, at most a thousandth of the mean length of a side. All that is welded lies within the
+///     for what single precision cannot tell apart, which is 2**-21 of the diagonal of the bounding box or, if all
+///     coordinates are numbers of single precision, of the greatest of them where that is larger; at most a hundredth of
+///     the mean length of a side. All that is welded lies within the
 ///     distance around one vertex, so chains are broken up, and no two vertices of one face are welded unless they coincide.
 /// coarse : bool
 ///     Whether large pieces of surface are cut into charts on a coarse mesh first, which is many times faster.

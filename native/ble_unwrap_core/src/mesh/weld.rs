@@ -15,9 +15,12 @@ use crate::progress::{Cancelled, Progress};
 /// different ways differ by up to four steps.
 const UNRESOLVED: f64 = 4.0 * f32::EPSILON as f64;
 
+/// Binary digits that double precision has more than single precision.
+const MORE_DIGITS: u32 = f64::MANTISSA_DIGITS - f32::MANTISSA_DIGITS;
+
 /// The distance found for a mesh is at most this share of its mean side: far from the origin the steps of single
 /// precision become as long as the sides, and vertices that a polygon tells apart are not the same.
-const MOST_OF_A_SIDE: f64 = 1e-3;
+const MOST_OF_A_SIDE: f64 = 1e-2;
 
 /// Leaders that a vertex tries to join, nearest first. More of them within the distance refuse it only in polygons that
 /// fold many corners into it.
@@ -47,8 +50,9 @@ pub(super) struct Places<'a> {
 /// The vertex that stands for each vertex: the lowest of those welded with it, itself where it is alone.
 ///
 /// Vertices at exactly the same position (−0 is 0) are always one. Others are one within `distance` of the input's unit;
-/// if `None`, within what single precision cannot tell apart: four steps of the larger of the greatest coordinate and the
-/// diagonal of the bounding box, at most a thousandth of the mean side.
+/// if `None`, within what single precision cannot tell apart: four steps of the diagonal of the bounding box or, if all
+/// coordinates are numbers of single precision, of the greatest of them where that is larger; at most a hundredth of the
+/// mean side.
 ///
 /// Vertices are taken in the order of their coordinates and join the nearest leader within the distance, or become one:
 /// so a group lies within the distance around its leader, chains of near vertices are broken up, and the numbering of the
@@ -93,7 +97,14 @@ fn unresolved(places: &Places<'_>) -> f64 {
         length += (places.points[b] - places.points[a]).norm();
         sides += 1;
     }
-    let size = places.frame.diagonal.max(places.frame.largest);
+    // Coordinates with more digits are exact to them far from the origin, too.
+    let is_single = |x: &f64| x.to_bits() << (64 - MORE_DIGITS) == 0;
+    let mut used = places.positions.iter().zip(places.used).filter(|(_, used)| **used);
+    let size = if used.all(|(p, _)| p.iter().all(is_single)) {
+        places.frame.diagonal.max(places.frame.largest)
+    } else {
+        places.frame.diagonal
+    };
     (UNRESOLVED * size).min(MOST_OF_A_SIDE * length / sides.max(1) as f64)
 }
 
