@@ -36,14 +36,14 @@ MAY_USE = {
     "verify": TOOLS - {"geodesics"} | {"metrics"},
     "rounding": TOOLS - {"geodesics"},
     "report": {"metrics"},
-    "atlas": {"report"},
+    "atlas": {"error", "report", "verify"},
     "clock": set(),
-    "error": {"mesh", "metrics", "packing", "progress"},
-    "settings": {"embedding", "error", "geodesics", "packing", "segmentation", "stretch"},
+    "error": {"memory", "mesh", "metrics", "packing", "progress", "verify"},
+    "settings": {"embedding", "error", "geodesics", "mesh", "packing", "segmentation", "stretch"},
     "flattening": TOOLS | {"embedding", "settings", "stretch"},
     # What sees several stages. None of the three sees another.
     "pipeline": TOOLS | set(STAGES) | JUDGES | GATHERED | RESULTS | {"flattening"},
-    "cloud": TOOLS | set(STAGES) | GATHERED | {"clock"},
+    "cloud": TOOLS | set(STAGES) | GATHERED | {"clock", "report"},
     "standalone": TOOLS | set(STAGES) | JUDGES | GATHERED | {"clock", "flattening"},
     "lib": {"atlas", "cloud", "error", "flattening", "mesh", "pipeline", "progress", "report", "settings", "verify"},
 }
@@ -167,9 +167,9 @@ def test_core_layers():
 
 # The pipeline, stage by stage: a file uses those of the rows above its own.
 PIPELINE = [
-    {"memo", "rigid", "tally"},
+    {"memo", "needs", "rigid", "tally"},
     {"flatten"},
-    {"polygon", "relief", "sew", "darts", "recut", "ribbons", "prolong"},
+    {"polygon", "relief", "sew", "darts", "recut", "ribbons", "prolong", "unbend"},
     {"charting", "carry", "budget"},
     {"merge"},
     {"component"},

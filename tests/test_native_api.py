@@ -48,6 +48,15 @@ def test_report_describes_the_result(ball):
     assert "Atlas(" in repr(atlas)
 
 
+def test_every_atlas_carries_its_proof(hill):
+    atlas = unwrap(*hill, margin=7, texture_size=512)
+    proof = atlas.certificate
+    assert proof["valid"] is True and proof["complete"] is True and proof["charts"] == atlas.report["charts"]
+    broken = ("out_of_range", "flipped", "crossings_inside", "crossings_between", "nested", "bad_loops")
+    assert all(proof[name] == 0 for name in broken) and proof["faulty_charts"] == []
+    assert proof["margin_texels"] == 7 and proof["gap_texels"] >= 7
+
+
 def test_a_square_is_unwrapped_without_distortion(square):
     atlas = unwrap(*square)
     assert atlas.report["charts"] == 1
@@ -221,7 +230,8 @@ def test_the_arrays_are_copied_before_the_call_returns(hill):
 
 
 def test_exceptions_are_one_tree():
-    kinds = [native.InvalidMeshError, native.InvalidArgumentError, native.Cancelled, native.InternalError]
+    kinds = [native.InvalidMeshError, native.InvalidArgumentError, native.Cancelled]
+    kinds += [native.UnprovenError, native.InternalError]
     assert issubclass(native.BleUnwrapError, Exception)
     for kind in kinds:
         assert kind.__bases__ == (native.BleUnwrapError,) and kind.__doc__

@@ -142,6 +142,7 @@ def test_results_travel_with_the_same_bytes(travel):
     for result in results():
         arrived = travel(result)
         assert type(arrived) is type(result) and arrived.report == result.report
+        assert getattr(arrived, "certificate", None) == getattr(result, "certificate", None)
         for name in ("uv", "chart", "embedded"):
             if hasattr(result, name):
                 before, after = getattr(result, name), getattr(arrived, name)

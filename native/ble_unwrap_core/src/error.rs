@@ -7,6 +7,7 @@ use crate::mesh::MeshError;
 use crate::metrics::UvMeshError;
 use crate::packing::PackError;
 use crate::progress::Cancelled;
+use crate::verify::Certificate;
 
 /// Why [`unwrap`](crate::unwrap()) gave no atlas. The text names the offending element and the remedy.
 #[derive(Debug, Error)]
@@ -33,6 +34,12 @@ pub enum UnwrapError {
     /// There is not enough memory: seen beforehand, or a piece of it was refused.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemory),
+    /// The layout could not be brought to hold what is promised; the certificate says what it breaks.
+    #[error(
+        "the layout cannot be proven to be free of flips and overlaps and to keep the margin: {0}; raise the texture size or \
+         lower the margin, and please report the mesh"
+    )]
+    Unproven(Box<Certificate>),
     /// The caller asked to stop.
     #[error(transparent)]
     Cancelled(Cancelled),

@@ -8,12 +8,14 @@ use ble_unwrap_core::mesh::MeshError;
 use ble_unwrap_core::packing::PackError;
 use ble_unwrap_core::standalone::{CloudDistancesError, DistancesError, FlattenError, LayoutError, RepackError};
 use ble_unwrap_core::stretch::StretchError;
-use ble_unwrap_core::{CloudError, UnwrapError};
+use ble_unwrap_core::{Certificate, CloudError, UnwrapError};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyMemoryError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
+
+use crate::report;
 
 create_exception!(ble_unwrap_native, BleUnwrapError, PyException, "Base of all exceptions of this module.");
 create_exception!(
@@ -33,6 +35,13 @@ create_exception!(
     Cancelled,
     BleUnwrapError,
     "The job was cancelled before it was finished. Nothing was produced."
+);
+create_exception!(
+    ble_unwrap_native,
+    UnprovenError,
+    BleUnwrapError,
+    "The layout could not be proven to hold what is promised. Its `certificate`, a dict, says what it breaks. Nothing was \
+     produced."
 );
 create_exception!(
     ble_unwrap_native,
@@ -60,18 +69,19 @@ fn out_of_memory_error(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
 
 /// Why a computation brought no result, as the worker leaves it: the exception to raise, and its text, which
 /// is the core's own.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Failure {
     kind: Kind,
     text: String,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 enum Kind {
     Mesh,
     Argument,
     Cancelled,
     Memory,
+    Unproven(Box<Certificate>),
     Internal,
 }
 
@@ -95,13 +105,19 @@ impl Failure {
     /// The exception to raise.
     pub(crate) fn to_py_err(&self) -> PyErr {
         let text = self.text.clone();
-        match self.kind {
+        match &self.kind {
             Kind::Mesh => InvalidMeshError::new_err(text),
             Kind::Argument => InvalidArgumentError::new_err(text),
             Kind::Cancelled => Cancelled::new_err(text),
             Kind::Memory => Python::attach(|py| match out_of_memory_error(py) {
                 Ok(kind) => PyErr::from_type(kind.clone(), text),
                 Err(error) => error,
+            }),
+            Kind::Unproven(certificate) => Python::attach(|py| {
+                let error = UnprovenError::new_err(text);
+                let given = report::certificate_to_dict(py, certificate)
+                    .and_then(|facts| error.value(py).setattr("certificate", facts));
+                given.err().unwrap_or(error)
             }),
             Kind::Internal => InternalError::new_err(text),
         }
@@ -175,6 +191,7 @@ impl Raised for UnwrapError {
             Self::Setting { .. } => Kind::Argument,
             Self::Pack(error) => error.kind(),
             Self::Check(_) => Kind::Mesh,
+            Self::Unproven(certificate) => Kind::Unproven(certificate.clone()),
             Self::OutOfMemory(error) => error.kind(),
             Self::Cancelled(error) => error.kind(),
         }
@@ -303,5 +320,6 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("InvalidArgumentError", py.get_type::<InvalidArgumentError>())?;
     module.add("Cancelled", py.get_type::<Cancelled>())?;
     module.add("OutOfMemoryError", out_of_memory_error(py)?)?;
+    module.add("UnprovenError", py.get_type::<UnprovenError>())?;
     module.add("InternalError", py.get_type::<InternalError>())
 }

@@ -1,7 +1,7 @@
 //! Reports and measures as dictionaries. Every field is named, so that a new one in the core is not forgotten here.
 
-use ble_unwrap_core::Report;
 use ble_unwrap_core::standalone::LayoutMeasures;
+use ble_unwrap_core::{Certificate, Report};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -56,6 +56,39 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'
     dict.set_item("atlas_limit", atlas_limit)?;
     dict.set_item("charts_over_limit", charts_over_limit)?;
     dict.set_item("warnings", warnings)?;
+    Ok(dict)
+}
+
+/// The outcome of the exact checks: whether all hold, how many elements break each, and the gap and the margin.
+pub(crate) fn certificate_to_dict<'py>(py: Python<'py>, certificate: &Certificate) -> PyResult<Bound<'py, PyDict>> {
+    let Certificate {
+        charts,
+        unmapped,
+        out_of_range,
+        flipped,
+        crossings_inside,
+        crossings_between,
+        nested,
+        bad_loops,
+        faulty_charts,
+        gap_texels,
+        margin_texels,
+        complete,
+    } = certificate;
+    let dict = PyDict::new(py);
+    dict.set_item("valid", certificate.is_valid())?;
+    dict.set_item("charts", charts)?;
+    dict.set_item("unmapped_triangles", unmapped.count)?;
+    dict.set_item("out_of_range", out_of_range.count)?;
+    dict.set_item("flipped", flipped.count)?;
+    dict.set_item("crossings_inside", crossings_inside.count)?;
+    dict.set_item("crossings_between", crossings_between.count)?;
+    dict.set_item("nested", nested.count)?;
+    dict.set_item("bad_loops", bad_loops.count)?;
+    dict.set_item("faulty_charts", faulty_charts)?;
+    dict.set_item("gap_texels", gap_texels)?;
+    dict.set_item("margin_texels", margin_texels)?;
+    dict.set_item("complete", complete)?;
     Ok(dict)
 }
 

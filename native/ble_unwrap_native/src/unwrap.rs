@@ -21,25 +21,35 @@ use crate::settings::{self, Function};
 ///     The chart of each face, from 0; -1 for faces that have a vertex with non-finite coordinates.
 /// report : dict
 ///     Measures of the result, taken from ``uv`` as it stands; see ``unwrap``.
+/// certificate : dict
+///     The outcome of the exact checks of ``uv``. ``valid`` is true, as ``unwrap`` raises ``UnprovenError`` otherwise: nothing
+///     is ``flipped``, ``out_of_range``, crosses (``crossings_inside``, ``crossings_between``) or is ``nested``, each chart has
+///     one outer boundary (``bad_loops``), and ``gap_texels`` is at least ``margin_texels``.
 #[pyclass(frozen, get_all, module = "ble_unwrap_native")]
 pub(crate) struct Atlas {
     uv: Py<Array>,
     chart: Py<Array>,
     report: Py<PyDict>,
+    certificate: Py<PyDict>,
 }
+
+/// What an [`Atlas`] is made of.
+type Parts = (Py<Array>, Py<Array>, Py<PyDict>, Py<PyDict>);
 
 #[pymethods]
 impl Atlas {
     #[new]
-    #[pyo3(signature = (uv, chart, report, /))]
-    fn new(uv: Py<Array>, chart: Py<Array>, report: Py<PyDict>) -> Self {
-        Self { uv, chart, report }
+    #[pyo3(signature = (uv, chart, report, certificate, /))]
+    fn new(uv: Py<Array>, chart: Py<Array>, report: Py<PyDict>, certificate: Py<PyDict>) -> Self {
+        Self { uv, chart, report, certificate }
     }
 
     /// For `pickle` and `copy`.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (Py<Array>, Py<Array>, Py<PyDict>)) {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, Parts) {
         let (py, of) = (slf.py(), slf.get());
-        (slf.get_type(), (of.uv.clone_ref(py), of.chart.clone_ref(py), of.report.clone_ref(py)))
+        let parts =
+            (of.uv.clone_ref(py), of.chart.clone_ref(py), of.report.clone_ref(py), of.certificate.clone_ref(py));
+        (slf.get_type(), parts)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
@@ -106,7 +116,8 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
     let uv = Py::new(py, Array::from_f32_rows(atlas.uv))?;
     let chart = Py::new(py, Array::from_i32(atlas.chart))?;
     let report = report::to_dict(py, &atlas.report)?.unbind();
-    Ok(Py::new(py, Atlas { uv, chart, report })?.into_any())
+    let certificate = report::certificate_to_dict(py, &atlas.certificate)?.unbind();
+    Ok(Py::new(py, Atlas { uv, chart, report, certificate })?.into_any())
 }
 
 /// Cut a surface into charts, flatten them under a stretch limit and pack them into one atlas.
@@ -199,7 +210,7 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 /// Returns
 /// -------
 /// Atlas
-///     ``uv`` (c, 2) float32, ``chart`` (f,) int32 and ``report``, a dict with ``charts``, ``faces``,
+///     ``uv`` (c, 2) float32, ``chart`` (f,) int32, ``certificate``, the outcome of the exact checks, and ``report``, a dict with ``charts``, ``faces``,
 ///     ``unmapped_faces``, ``l2``, ``l2_chart_scale``, ``l2_worst_chart``, ``l_infinity``, ``angle_distortion``,
 ///     ``area_distortion``, ``flips``, ``bent_quads``, ``overlaps``, ``seam_length``, ``packing_efficiency``, ``gap_texels``,
 ///     ``chart_limit``, ``atlas_limit``, ``charts_over_limit``, ``rungs``, ``seconds``, ``warnings`` and more.
@@ -215,6 +226,8 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 ///     If indices or offsets do not make a mesh. The text names the first wrong element.
 /// OutOfMemoryError
 ///     If there is not enough memory. The result never depends on how much there is.
+/// UnprovenError
+///     If the layout cannot be proven to hold what is guaranteed below; its ``certificate`` says what it breaks.
 /// InternalError
 ///     If the library is at fault.
 ///

@@ -6,7 +6,7 @@ use crate::progress::Progress;
 
 use super::EmbeddingError;
 use super::logistic::{logistic, logistic_pair};
-use super::source::square_matrix;
+use super::square_matrix::square_matrix;
 
 /// How affinity falls with distance d, for a kernel width σ in units of squared distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

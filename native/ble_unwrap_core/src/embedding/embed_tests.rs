@@ -587,7 +587,7 @@ proptest! {
 fn large_matrices_are_refused_with_advice() {
     // More pairs than there is address space for.
     let n = 1 << 28;
-    let source = super::source::square_matrix(n);
+    let source = super::square_matrix::square_matrix(n);
     let error = source.expect_err("no memory");
     assert_eq!(error, EmbeddingError::TooManyPoints { points: n });
     assert!(error.to_string().contains("landmarks"));

@@ -38,6 +38,7 @@ mod placement;
 mod random;
 mod settings;
 mod source;
+mod square_matrix;
 mod truncated;
 mod unfold;
 

@@ -13,6 +13,7 @@ use super::affinity::{Kernel, KernelWidth, kernel_width};
 use super::error::EmbeddingError;
 use super::input::{EmbedInput, PointMetric};
 use super::landmark_regression::Evidence;
+use super::square_matrix::square_matrix;
 
 /// Points looked at a task when distances to one point are taken.
 const CHUNK: usize = 4096;
@@ -390,12 +391,4 @@ fn symmetrise(matrix: &mut [f64], n: usize) {
 /// The p coordinates of some points: all first ones, then all second ones, …
 fn transpose(data: &[f64], p: usize, chosen: impl Iterator<Item = usize> + Clone) -> Vec<f64> {
     (0..p).flat_map(|c| chosen.clone().map(move |i| data[i * p + c])).collect()
-}
-
-/// An n×n matrix of zeros, if there is room.
-pub(super) fn square_matrix(n: usize) -> Result<Vec<f64>, EmbeddingError> {
-    let room = n.checked_mul(n).and_then(|count| memory::required(count).ok());
-    let mut matrix: Vec<f64> = room.ok_or(EmbeddingError::TooManyPoints { points: n })?;
-    matrix.resize(n * n, 0.0);
-    Ok(matrix)
 }

@@ -12,7 +12,7 @@ use crate::progress::Progress;
 
 use super::affinity::{Affinity, Kernel};
 use super::error::EmbeddingError;
-use super::source::square_matrix;
+use super::square_matrix::square_matrix;
 
 /// Coordinates summed between two looks at the radius.
 const STRIDE: usize = 16;

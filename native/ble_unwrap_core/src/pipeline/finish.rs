@@ -10,8 +10,8 @@ use crate::clock::Clock;
 use crate::distortion;
 use crate::error::UnwrapError;
 use crate::mesh::{self, FaceId, MeshInput, Surface, measure};
-use crate::metrics::{self, Texture, UvMesh, UvMeshError};
-use crate::packing::{self, PackItem, Packed};
+use crate::metrics::{self, Measures, Texture, UvMesh, UvMeshError};
+use crate::packing::{self, PackItem, PackSettings, Packed};
 use crate::progress::{Cancelled, Stage};
 use crate::report::{Report, counted};
 use crate::rounding::{self, Rounding, RoundingError};
@@ -28,6 +28,8 @@ use crate::flattening::{Rung, Rungs};
 const MOST_ROUNDS: usize = 12;
 /// From this round on a faulty chart comes apart into single polygons, which always do.
 const LAST_RESORT: usize = 9;
+/// Charts that came out too near are packed at least so many texels further apart.
+const LEAST_WIDENING: f64 = 1.0 / 16.0;
 /// A chart of less area than this times the square of its longest edge is drawn with that.
 const LEAST_AREA: f64 = 1e-12;
 /// And one without any extent with this. Packing makes it a texel.
@@ -51,68 +53,104 @@ pub(super) fn finish(
     progress: &Run<'_>,
 ) -> Result<Atlas, UnwrapError> {
     let arrays = Arrays::new(input, surface);
+    let mut packing = settings.packing.clone();
     let mut round = 0;
     loop {
         charts = unbend::unbend(charts, settings, &mut rungs, progress)?;
         clock.lap("unbend");
         progress.enter(Stage::Pack);
         scale(&mut charts, settings);
-        let layout = Layout::new(input, surface, &charts, settings, progress)?;
+        let layout = Layout::new(input, surface, &charts, &packing, progress)?;
         clock.lap("pack");
         progress.enter(Stage::Verify);
         let mesh = arrays.uv_mesh(&layout, settings)?;
         // The corners are listed as the surface winds its faces: none is reversed to them.
         let certificate = verify::verify(&mesh, &[], progress)?;
-        let faulty: BTreeSet<usize> =
-            certificate.faulty_charts.iter().filter_map(|&c| usize::try_from(c).ok()).collect();
         round += 1;
-        if (faulty.is_empty() && layout.broken.is_empty()) || round == MOST_ROUNDS {
-            // Nothing is left to mend.
-            drop(charts);
-            let measures = metrics::measure(&mesh, progress)?;
-            clock.lap("verify");
-            let mut report = Report::new(&measures, settings.chart_limit());
-            report.faces = input.face_offsets.len().saturating_sub(1);
-            report.unmapped_faces = surface.unmapped.len();
-            report.warnings = warnings(surface, &layout, &certificate);
-            if measures.faces > measures.unmapped_faces && measures.l2.is_nan() {
-                report.warnings.push(
-                    "the stretch could not be measured: every triangle is thinner than single precision tells from none"
-                        .into(),
-                );
+        match next_step(&certificate, !layout.broken.is_empty(), round) {
+            NextStep::End => {
+                drop(charts);
+                let measures = metrics::measure(&mesh, progress)?;
+                clock.lap("verify");
+                let mut report = report_of(input, surface, &layout, &measures, settings);
+                report.rungs = rungs.taken();
+                report.seconds = clock.into_laps();
+                let atlas = Atlas::proven(layout.uv, layout.polygon_chart, report, certificate)?;
+                progress.enter(Stage::Done);
+                return Ok(atlas);
             }
-            report.bent_quads = metrics::bent_quads(input, &layout.uv, |face| layout.polygon_chart[face] >= 0).len();
-            if report.bent_quads > 0 {
-                report.warnings.push(unbend::warning(report.bent_quads));
+            NextStep::Widen(shortfall) => packing.margin_texels += shortfall,
+            NextStep::Mend => {
+                let faulty: BTreeSet<usize> =
+                    certificate.faulty_charts.iter().filter_map(|&c| usize::try_from(c).ok()).collect();
+                let faults = Faults { round, faulty: &faulty, broken: &layout.broken };
+                charts = mend(surface, charts, &faults, &mut rungs, settings, progress)?;
             }
-            if let Some(&(chart, l2)) = report.charts_over_limit.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
-                report.warnings.push(format!(
-                    "{} the stretch limit, the worst is chart {chart} with {l2:.3}",
-                    counted(report.charts_over_limit.len(), ["chart exceeds", "charts exceed"])
-                ));
-            }
-            if settings.limit_over == LimitOver::Atlas {
-                report.atlas_limit = Some(settings.stretch_limit);
-                if report.l2_chart_scale > settings.stretch_limit {
-                    let (l2, limit) = (report.l2_chart_scale, settings.stretch_limit);
-                    report.warnings.push(format!("the atlas has a stretch of {l2:.3}, above the limit of {limit}"));
-                }
-            }
-            report.rungs = rungs.taken();
-            report.seconds = clock.into_laps();
-            progress.enter(Stage::Done);
-            return Ok(Atlas { uv: layout.uv, chart: layout.polygon_chart, report });
         }
-        charts = mend(
-            surface,
-            charts,
-            &Faults { round, faulty: &faulty, broken: &layout.broken },
-            &mut rungs,
-            settings,
-            progress,
-        )?;
         clock.lap("mend");
     }
+}
+
+/// What follows from the checks of a layout.
+#[derive(Debug, PartialEq)]
+enum NextStep {
+    /// It is proven, or there is nothing left to try.
+    End,
+    /// Charts that break a rule are made anew.
+    Mend,
+    /// Charts are packed so many texels further apart: rounding has moved some towards each other.
+    Widen(f64),
+}
+
+/// `has_broken` tells whether rounding turned faces over; rounds count from 1.
+fn next_step(certificate: &Certificate, has_broken: bool, round: usize) -> NextStep {
+    let has_faults = has_broken || !certificate.faulty_charts.is_empty();
+    if round >= MOST_ROUNDS || certificate.is_valid() && !has_broken {
+        NextStep::End
+    } else if has_faults {
+        NextStep::Mend
+    } else if certificate.is_injective() && certificate.gap_texels < certificate.margin_texels {
+        NextStep::Widen(LEAST_WIDENING.max(certificate.margin_texels - certificate.gap_texels))
+    } else {
+        NextStep::End
+    }
+}
+
+/// The figures of a layout, and what the user should know of it.
+fn report_of(
+    input: &MeshInput<'_>,
+    surface: &Surface,
+    layout: &Layout,
+    measures: &Measures,
+    settings: &Settings,
+) -> Report {
+    let mut report = Report::new(measures, settings.chart_limit());
+    report.faces = input.face_offsets.len().saturating_sub(1);
+    report.unmapped_faces = surface.unmapped.len();
+    report.warnings = warnings(surface, layout);
+    if measures.faces > measures.unmapped_faces && measures.l2.is_nan() {
+        report.warnings.push(
+            "the stretch could not be measured: every triangle is thinner than single precision tells from none".into(),
+        );
+    }
+    report.bent_quads = metrics::bent_quads(input, &layout.uv, |face| layout.polygon_chart[face] >= 0).len();
+    if report.bent_quads > 0 {
+        report.warnings.push(unbend::warning(report.bent_quads));
+    }
+    if let Some(&(chart, l2)) = report.charts_over_limit.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
+        report.warnings.push(format!(
+            "{} the stretch limit, the worst is chart {chart} with {l2:.3}",
+            counted(report.charts_over_limit.len(), ["chart exceeds", "charts exceed"])
+        ));
+    }
+    if settings.limit_over == LimitOver::Atlas {
+        report.atlas_limit = Some(settings.stretch_limit);
+        if report.l2_chart_scale > settings.stretch_limit {
+            let (l2, limit) = (report.l2_chart_scale, settings.stretch_limit);
+            report.warnings.push(format!("the atlas has a stretch of {l2:.3}, above the limit of {limit}"));
+        }
+    }
+    report
 }
 
 /// Brings each chart to the area of its surface, and to the density that its stretch asks for.
@@ -192,10 +230,10 @@ impl Layout {
         input: &MeshInput<'_>,
         surface: &Surface,
         charts: &[Chart],
-        settings: &Settings,
+        packing: &PackSettings,
         progress: &Run<'_>,
     ) -> Result<Self, UnwrapError> {
-        let packed = pack(charts, settings, progress)?;
+        let packed = pack(charts, packing, progress)?;
         let size = packed.size.map(f64::from);
         let rounding = Rounding { texel: size.map(|s| 1.0 / s), diagonal: diagonal(surface) };
         let mut layout = Self {
@@ -241,13 +279,13 @@ impl Layout {
     }
 }
 
-fn pack(charts: &[Chart], settings: &Settings, progress: &Run<'_>) -> Result<Packed, UnwrapError> {
+fn pack(charts: &[Chart], packing: &PackSettings, progress: &Run<'_>) -> Result<Packed, UnwrapError> {
     let index = |v: mesh::VertexId| u32::try_from(v.index()).unwrap_or(u32::MAX);
     let triangles: Vec<Vec<[u32; 3]>> =
         charts.iter().map(|c| c.patch.mesh.triangles().iter().map(|t| t.map(index)).collect()).collect();
     let items: Vec<PackItem<'_>> =
         charts.iter().zip(&triangles).map(|(c, t)| PackItem { points: &c.uv, triangles: t }).collect();
-    Ok(packing::pack(&items, &settings.packing, progress)?)
+    Ok(packing::pack(&items, packing, progress)?)
 }
 
 fn diagonal(surface: &Surface) -> f64 {
@@ -339,24 +377,60 @@ fn sorted(faces: &[FaceId]) -> Vec<FaceId> {
     faces
 }
 
-fn warnings(surface: &Surface, layout: &Layout, certificate: &Certificate) -> Vec<String> {
+fn warnings(surface: &Surface, layout: &Layout) -> Vec<String> {
     let mut list = surface.defects.warnings();
     if layout.specks > 0 {
         let specks = counted(layout.specks, ["chart smaller than a texel was", "charts smaller than a texel were"]);
         list.push(format!("{specks} enlarged to one"));
-    }
-    if !certificate.is_valid() {
-        list.push(format!(
-            "the result could not be proven free of overlap: {}, {} in charts, {} between charts; raise the texture size \
-             or lower the margin",
-            counted(certificate.flipped.count, ["flipped triangle", "flipped triangles"]),
-            counted(certificate.crossings_inside.count, ["crossing", "crossings"]),
-            certificate.crossings_between.count
-        ));
     }
     let area = measure::total_area(&surface.mesh);
     if surface.mesh.face_count() > 0 && area <= 0.0 {
         list.push("no face has an area".into());
     }
     list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verify::Defect;
+
+    fn checked(change: impl FnOnce(&mut Certificate)) -> Certificate {
+        let mut certificate =
+            Certificate { complete: true, gap_texels: 4.0, margin_texels: 4.0, ..Certificate::default() };
+        change(&mut certificate);
+        certificate
+    }
+
+    #[test]
+    fn a_proven_layout_is_the_end_and_any_fault_is_mended_first() {
+        let proven = checked(|_| ());
+        assert_eq!(next_step(&proven, false, 1), NextStep::End);
+        assert_eq!(next_step(&proven, true, 1), NextStep::Mend);
+        let flipped = checked(|c| {
+            c.flipped = Defect { count: 1, first: Some(3) };
+            c.faulty_charts = vec![0];
+            c.gap_texels = 0.0;
+        });
+        assert_eq!(next_step(&flipped, false, 1), NextStep::Mend);
+        assert_eq!(next_step(&flipped, true, MOST_ROUNDS - 1), NextStep::Mend);
+        assert_eq!(next_step(&flipped, true, MOST_ROUNDS), NextStep::End, "with an error that carries the certificate");
+    }
+
+    #[test]
+    fn charts_too_near_are_packed_further_apart() {
+        let near = checked(|c| c.gap_texels = 3.75);
+        assert_eq!(next_step(&near, false, 1), NextStep::Widen(0.25));
+        let all_but = checked(|c| c.gap_texels = 3.9999);
+        assert_eq!(next_step(&all_but, false, 1), NextStep::Widen(LEAST_WIDENING));
+        assert_eq!(next_step(&near, false, MOST_ROUNDS), NextStep::End);
+    }
+
+    #[test]
+    fn what_cannot_be_checked_is_not_tried_for_ever() {
+        let endless = checked(|c| c.complete = false);
+        assert_eq!(next_step(&endless, false, 1), NextStep::End);
+        let unmeasured = checked(|c| c.gap_texels = f64::NAN);
+        assert_eq!(next_step(&unmeasured, false, 1), NextStep::End);
+    }
 }

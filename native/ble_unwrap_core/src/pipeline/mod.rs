@@ -39,9 +39,10 @@ use memo::Run;
 
 /// Unwraps a mesh: cuts it into charts, flattens them under the stretch limit, packs them.
 ///
-/// Guaranteed for every result, and checked exactly on the final single-precision values: each face
-/// whose vertices are finite lies in exactly one chart; no triangle is flipped or without area; no
-/// chart overlaps itself or another; charts keep the margin. Every chart has an L2 stretch within
+/// Guaranteed for every result, checked exactly on the final single-precision values, and proven by its
+/// [`Certificate`](crate::Certificate): each face whose vertices are finite lies in exactly one chart; no triangle is flipped
+/// or without area; no chart overlaps itself or another; charts keep the margin. Where that cannot be proven the call fails.
+/// Every chart has an L2 stretch within
 /// `settings.stretch_limit` or is listed in the report (a single polygon may not flatten under it); where that limit is
 /// over the atlas, this holds for [`Settings::chart_limit`], and the whole is within the limit or the report warns. The
 /// result is the same, bit for bit, for any number of threads.

@@ -30,6 +30,8 @@ mod boundary;
 mod crossings;
 mod nesting;
 
+use std::fmt;
+
 use robust::{Coord, orient2d};
 
 use crate::metrics::{GAP_SEARCH_TEXELS, NONE, OwnedSegment, UvMesh, least_gap};
@@ -93,15 +95,56 @@ pub struct Certificate {
     /// Least distance between boundaries of different charts in texels, not exact but to rounding;
     /// the search limit (eight texels, or twice the margin) if it is more.
     pub gap_texels: f64,
+    /// What that distance has to be.
+    pub margin_texels: f64,
     /// False if a bound of work ended a search. Then there are so many contacts that counts are lower
     /// bounds and the first offender need not be the lowest, or nothing is proven.
     pub complete: bool,
 }
 
+/// What is wrong, in one clause; "nothing" where nothing is.
+impl fmt::Display for Certificate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let counts = [
+            (self.out_of_range.count, ["triangle outside the texture", "triangles outside the texture"]),
+            (self.flipped.count, ["flipped triangle", "flipped triangles"]),
+            (self.crossings_inside.count, ["crossing of a chart with itself", "crossings of charts with themselves"]),
+            (self.crossings_between.count, ["crossing between charts", "crossings between charts"]),
+            (self.nested.count, ["chart within another", "charts within others"]),
+            (self.bad_loops.count, ["chart without one outer boundary", "charts without one outer boundary each"]),
+        ];
+        let mut found: Vec<String> = counts
+            .into_iter()
+            .filter(|c| c.0 > 0)
+            .map(|(n, words)| format!("{n} {}", words[usize::from(n > 1)]))
+            .collect();
+        if self.gap_texels.is_nan() || self.gap_texels < self.margin_texels {
+            found.push(format!("charts {} texels apart instead of {}", self.gap_texels, self.margin_texels));
+        }
+        if !self.complete {
+            found.push("more contacts than can be looked at".into());
+        }
+        if found.is_empty() { f.write_str("nothing") } else { f.write_str(&found.join(", ")) }
+    }
+}
+
 impl Certificate {
-    /// Whether the layout is proven to be injective and in the unit square.
+    /// Whether the layout is proven to be injective, to lie in the unit square and to keep the margin.
     #[must_use]
     pub fn is_valid(&self) -> bool {
+        self.is_injective() && self.keeps_margin()
+    }
+
+    /// Whether charts are at least the margin apart.
+    #[must_use]
+    pub fn keeps_margin(&self) -> bool {
+        // NaN keeps nothing.
+        self.complete && self.gap_texels >= self.margin_texels
+    }
+
+    /// Whether the layout is proven to be injective and to lie in the unit square.
+    #[must_use]
+    pub fn is_injective(&self) -> bool {
         self.complete
             && self.out_of_range.count == 0
             && self.flipped.count == 0
@@ -202,7 +245,8 @@ pub fn verify(mesh: &UvMesh, reversed: &[bool], progress: &Progress) -> Result<C
         .iter()
         .map(|e| OwnedSegment { ends: e.ends.map(|p| [0, 1].map(|k| f64::from(p[k]) * texels[k])), owner: e.chart })
         .collect();
-    let limit = GAP_SEARCH_TEXELS.max(2.0 * mesh.texture().margin);
+    out.margin_texels = mesh.texture().margin;
+    let limit = GAP_SEARCH_TEXELS.max(2.0 * out.margin_texels);
     let (gap, complete) = least_gap(&segments, limit, progress)?;
     out.gap_texels = gap;
     out.complete &= complete;
