@@ -11,7 +11,7 @@ from pathlib import Path
 
 import bpy
 
-from . import engine, input_file, properties
+from . import asset_io, engine, input_file, properties
 from .batch_plan import files_of
 
 # Of the options: what changes no result.
@@ -41,7 +41,7 @@ class Evidence:
 
         `external` are the files that Blender read besides.
         """
-        read = {path: self.digest(path) for path in [*input_file.named_files(planned.source), *external]}
+        read = {path: self.digest(path) for path in [*asset_io.named_files(planned.source), *external]}
         return {
             "key": self.key,
             "read": _relative(read, planned.source.parent) | {planned.source.name: digest},

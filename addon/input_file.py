@@ -1,17 +1,12 @@
-"""Files as they lie on disk: what can be read, which other files a file names, and digests of all.
+"""Files as they lie on disk: what can be read, and digests.
 
 Standard library only.
 """
 
 import errno
 import hashlib
-import json
-import mmap
-import re
 import stat
-import struct
 from pathlib import Path
-from urllib.parse import unquote
 
 # Kinds of a file that are no regular file, in the words of the user.
 KINDS = (
@@ -21,9 +16,6 @@ KINDS = (
     (stat.S_ISCHR, "a device"),
     (stat.S_ISBLK, "a device"),
 )
-GLB_MAGIC, GLB_JSON = b"glTF", 0x4E4F534A
-# A URI with a scheme (`data:`, `https:`) names no file; one letter is a drive of Windows.
-SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")
 
 
 def why_unreadable(path):
@@ -68,47 +60,3 @@ class Digests:
             return known[1]
         except OSError:
             return None
-
-
-def named_files(path):
-    """Files beside a file that it names and that are read with it: glTF's buffers and images, OBJ's materials.
-
-    Those that are not there are among them. What cannot be understood names nothing: whoever reads it will say why.
-    """
-    path = Path(path)
-    kind = path.suffix.lower()
-    try:
-        if kind in (".gltf", ".glb"):
-            names = _names_in_gltf(path)
-        elif kind == ".obj":
-            names = _names_in_obj(path)
-        else:
-            names = []
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, struct.error):
-        names = []
-    return list(dict.fromkeys(path.parent / name for name in names))
-
-
-def _names_in_gltf(path):
-    with path.open("rb") as stream:
-        if stream.read(4) == GLB_MAGIC:
-            _version, _length, length, kind = struct.unpack("<4I", stream.read(16))
-            if kind != GLB_JSON:
-                return []
-            content = json.loads(stream.read(length))
-        else:
-            stream.seek(0)
-            content = json.load(stream)
-    uris = [entry.get("uri") for key in ("buffers", "images") for entry in content.get(key, ())]
-    return [unquote(uri) for uri in uris if uri and not SCHEME.match(uri)]
-
-
-def _names_in_obj(path):
-    names = []
-    if path.stat().st_size:
-        with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as content:
-            found = [match[1] for match in re.finditer(rb"(?m)^[ \t]*mtllib[ \t]+([^\r\n]+)", content)]
-        for text in (match.decode("utf-8", "surrogateescape").strip() for match in found):
-            # The format separates names by spaces; Blender takes the line for one name, which may hold some.
-            names += [text] if (path.parent / text).is_file() else text.split()
-    return [*names, path.with_suffix(".mtl").name]  # Blender reads the namesake, named or not

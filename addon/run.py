@@ -15,8 +15,8 @@ class Run:
     """Reads all objects when made, then computes (`run` or `start`), then writes (`write`).
 
     Surfaces share one atlas (`one_atlas=False`: have one each); a cloud has a texture to itself. With `keep`, the
-    analysis of the one atlas is kept for the next run. `by_uv` as in `faces.chosen_faces`. What cannot be written, or has
-    neither faces nor enough points, is left out as long as anything else is there, with a note unless it is empty.
+    analysis of the one atlas is kept for the next run. `by_uv` as in `faces.chosen_faces`. What cannot be written, or
+    has neither faces nor enough points, is left out as long as anything else is there, with a note unless it is empty.
     Raises what the tasks raise; whenever it does, nothing was changed.
     """
 

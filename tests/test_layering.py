@@ -305,7 +305,16 @@ NEVER = {
     # What looks at files from others or reads them back needs no Blender, so that nothing is opened by it.
     **{
         f"asset_io/{name}.py": {"bpy", "bmesh"}
-        for name in ("formats", "gltf_file", "input_check", "ply_header", "read_back", "zstd_frames")
+        for name in (
+            "formats",
+            "gltf_file",
+            "input_check",
+            "named_files",
+            "obj_file",
+            "ply_header",
+            "read_back",
+            "zstd_frames",
+        )
     },
     "modifiers.py": {".engine", "ble_unwrap_native"},
     "input_file.py": {"bpy", "bmesh", "numpy", ".engine", ".asset_io", "ble_unwrap_native"},

@@ -15,6 +15,7 @@ from .formats import (
     keeps_points,
 )
 from .loading import load, new_scene
+from .named_files import named_files
 from .saving import save
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "file_format",
     "keeps_points",
     "load",
+    "named_files",
     "new_scene",
     "prepare",
     "save",

@@ -6,13 +6,12 @@ in its own folder), declares more than it can hold, or would take more than `MOS
 """
 
 import mmap
-import re
 import stat
 import struct
 import zlib
 from pathlib import Path
 
-from . import gltf_file, ply_header, zstd_frames
+from . import gltf_file, obj_file, ply_header, zstd_frames
 from .formats import AssetError, file_format
 
 # Bytes of an input with the files that belong to it, unpacked: about a hundred million triangles. The tightest of the
@@ -111,52 +110,23 @@ def _zstd_size(stream, size):
 
 # Text formats -------------------------------------------------------------------------------------------------------
 
-# Blank of an OBJ file within a line: a backslash at the end of a line goes on with the next one.
-_BLANK = rb"(?:[ \t]|\\\r?\n)"
-_REST = rb"((?:[^\r\n\\]|\\(?!\r?\n)|\\\r?\n)*)"
-_LIBRARY = re.compile(rb"mtllib" + _BLANK + rb"+" + _REST)
-_TEXTURE = re.compile(rb"(?mi)^[ \t]*(?:map_\w+|bump|norm|disp|decal|refl)[ \t]+([^\r\n]*)")
 MATERIAL_BYTES = 1 << 30  # of one .mtl file
-MOST_OPTIONS = 32  # words before the name of a texture; the format has eleven options of up to four words
 
 
-def _obj(path, size):
+def _obj(path, _size):
     """The material libraries that it names, and their textures, are ordinary files where they exist."""
     folder = Path(path).parent
-    names = {Path(path).with_suffix(".mtl").name}  # which Blender reads even where it is not named
-    if size:
-        with Path(path).open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            names |= set(_libraries(data))
-    for name in sorted(names):
-        for library in (folder / part for part in _ways_to_read(name)):
+    for name in sorted(obj_file.libraries(path)):
+        for library in (folder / part for part in obj_file.ways_to_read(name)):
             if not _is_there(library) or library.is_dir():
                 continue
             if regular_size(library, name) > MATERIAL_BYTES:
                 raise AssetError(f"names {name!r}, which is larger than {MATERIAL_BYTES >> 20} MB")
-            for match in _TEXTURE.finditer(library.read_bytes()):
-                for part in _ways_to_read(_text(match[1])):
+            for name_of_texture in obj_file.textures(library):
+                for part in obj_file.ways_to_read(name_of_texture):
                     texture = library.parent / part
                     if _is_there(texture) and not texture.is_dir():  # an option's word may be the name of a folder
                         regular_size(texture, part)
-
-
-def _libraries(data):
-    """The rest of every line of an OBJ file that may name a material library; also of a comment, which does no harm."""
-    at = data.find(b"mtllib")
-    while at >= 0:
-        if match := _LIBRARY.match(data, at):
-            yield _text(match[1])
-        at = data.find(b"mtllib", at + 1)
-
-
-def _text(data):
-    return re.sub(rb"\\\r?\n", b" ", data).decode("utf-8", "surrogateescape").strip().strip('"')
-
-
-def _ways_to_read(text):
-    """The names that the rest of a line may hold: all of it, or, since options come first, what follows a blank."""
-    parts = text.replace("\\", "/").split(maxsplit=MOST_OPTIONS)
-    return {" ".join(parts[k:]) for k in range(len(parts))} | ({text} if text else set())
 
 
 def _is_there(path):

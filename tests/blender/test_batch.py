@@ -507,14 +507,14 @@ def test_output_that_is_a_loop_of_links_is_replaced_or_said(batch, files, tmp_pa
 @pytest.mark.skipif(os.name == "nt", reason="no pipes there")
 def test_pipe_as_the_buffer_of_a_gltf_is_not_opened(addon, tmp_path):
     """Only regular files are read for their digest: a pipe would wait, a device never end."""
-    inputs = addon("input_file")
+    inputs, asset_io = addon("input_file"), addon("asset_io")
     os.mkfifo(tmp_path / "a.bin")
     content = {"buffers": [{"uri": "a.bin"}, {"uri": "data:,x"}, {}], "images": [{"uri": "my%20picture.png"}]}
     (tmp_path / "a.gltf").write_text(json.dumps(content))
-    named = inputs.named_files(tmp_path / "a.gltf")
+    named = asset_io.named_files(tmp_path / "a.gltf")
     assert [path.name for path in named] == ["a.bin", "my picture.png"]
     assert [inputs.Digests().of(path) for path in named] == [None, None]
     assert inputs.Digests().of("/dev/zero") is None
     for text in ("", "{", "[]", '{"buffers": 3}', '{"buffers": [3]}', "glTF"):
         (tmp_path / "a.gltf").write_text(text)
-        assert inputs.named_files(tmp_path / "a.gltf") == []
+        assert asset_io.named_files(tmp_path / "a.gltf") == []
