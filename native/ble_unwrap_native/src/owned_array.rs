@@ -133,12 +133,13 @@ impl Array {
                 )));
             }
         };
-        let bytes_of = |lengths: &mut dyn Iterator<Item = usize>| {
-            lengths.try_fold(elements.item_size(), usize::checked_mul).filter(|&bytes| isize::try_from(bytes).is_ok())
+        let bytes_of = |least: usize| {
+            let product = shape.iter().try_fold(elements.item_size(), |bytes, &n| bytes.checked_mul(n.max(least)));
+            product.filter(|&bytes| isize::try_from(bytes).is_ok())
         };
         // Distances along the dimensions are counted where there are no elements, too.
-        let fits = bytes_of(&mut shape.iter().map(|&length| length.max(1))).is_some();
-        if !(1..=2).contains(&shape.len()) || !fits || bytes_of(&mut shape.iter().copied()) != Some(bytes.len()) {
+        let fits = bytes_of(1).is_some();
+        if !(1..=2).contains(&shape.len()) || !fits || bytes_of(0) != Some(bytes.len()) {
             return Err(InvalidArgumentError::new_err(format!(
                 "shape: expected one or two lengths of {} elements together; found {shape:?}",
                 elements.len()
