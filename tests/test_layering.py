@@ -234,7 +234,7 @@ def test_core_neither_prints_nor_opens_files():
         # Seconds of the report.
         and not (match[0] == "Instant::now" and module_path(file) == ("clock",))
         # How much memory is left is in files of /proc.
-        and not (match[0] == "std::fs" and module_path(file) == ("memory",))
+        and not (match[0] == "std::fs" and module_path(file)[:1] == ("memory",))
     ]
     assert not found
 

@@ -37,8 +37,8 @@ else:
 
 def unwrapped_within(room, segments=48, threads=2):
     """What is printed by a process that may take so many MiB of address space beyond those of its start; 0 for any."""
-    code = UNDER_A_LIMIT.format(room=room, segments=segments, threads=threads)
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd="tests", timeout=300)
+    command = [sys.executable, "-c", UNDER_A_LIMIT.format(room=room, segments=segments, threads=threads)]
+    run = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parent, timeout=300)
     assert run.returncode == 0, f"{room} MiB: exit code {run.returncode}\n{run.stdout}{run.stderr[-2000:]}"
     return run.stdout
 

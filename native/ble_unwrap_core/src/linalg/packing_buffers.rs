@@ -1,12 +1,12 @@
 //! The buffers that faer's dense products pack their factors into.
 //!
-//! Each thread makes them once, at its first larger product, twice the size of the last cache: a gigabyte of address space a
-//! thread on some servers, of which hardly anything is ever touched. Where that is refused the process ends, so it is asked
+//! Each thread makes them once, at its first larger product, twice the size of the last cache: up to a gigabyte of address
+//! space a thread on some servers, of which hardly anything is ever touched. Where that is refused the process ends, so it is asked
 //! for here before, in a way that can fail.
 
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
@@ -67,26 +67,10 @@ pub fn bytes_of_packing_buffers(threads: usize) -> u64 {
     (missing as u64).saturating_mul(bytes_a_thread() + SLACK)
 }
 
-/// Twice the last cache, as faer's kernels take it: AMD's processors tell that of all cores together.
-#[cfg(target_arch = "x86_64")]
+/// Twice the last cache; elsewhere than on x86 the buffers are as large as the second one, which the slack covers.
 fn bytes_a_thread() -> u64 {
-    use raw_cpuid::CpuId;
-
-    /// What the kernels assume at least, and the unit in which AMD tells the size.
-    const LEAST: u64 = 2 << 20;
-    const AMD_UNIT: u64 = 512 << 10;
-    let cpu = CpuId::new();
-    let of_levels = cpu.get_cache_parameters().into_iter().flatten().filter(|c| c.level() <= 3);
-    let of_levels =
-        of_levels.map(|c| c.associativity() as u64 * c.sets() as u64 * c.coherency_line_size() as u64).max();
-    let of_package = cpu.get_l2_l3_cache_and_tlb_info().map(|c| u64::from(c.l3cache_size()) * AMD_UNIT);
-    2 * of_levels.unwrap_or(0).max(of_package.unwrap_or(0)).max(LEAST)
-}
-
-/// Elsewhere the buffers are as large as the second cache, which the slack covers.
-#[cfg(not(target_arch = "x86_64"))]
-fn bytes_a_thread() -> u64 {
-    0
+    static BYTES: OnceLock<u64> = OnceLock::new();
+    *BYTES.get_or_init(|| if cfg!(target_arch = "x86_64") { 2 * memory::last_cache() } else { 0 })
 }
 
 #[cfg(test)]

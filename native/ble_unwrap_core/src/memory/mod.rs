@@ -5,10 +5,14 @@
 //! are asked for fallibly ([`reserve`]). And an allocator that had to fall back on its reserve says so by
 //! [`note_refusal`], upon which every computation under way stops at its next look at [`Progress`](crate::Progress).
 
+mod last_cache;
+
 use std::fs;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use thiserror::Error;
+
+pub(crate) use last_cache::last_cache;
 
 /// The computation needs more memory than there is; nothing was produced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
