@@ -53,6 +53,7 @@ def demonstrate_mesh(objects, name, out, options):
     rows = compare.compare_objects(objects, name, out, {}, progress=show_progress)
     end_progress()
     print(f"{name}: {engine.summary(rows['ble_unwrap'], rows['ble_unwrap']['seconds_total'])}", flush=True)
+    print(f"{name}: unwrapping by xatlas, which may take minutes", flush=True)
     rows, reason = compare.with_xatlas(rows, objects, {})
     if reason:
         print(f"{name}: {reason}", flush=True)
