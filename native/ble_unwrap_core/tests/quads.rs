@@ -1,11 +1,16 @@
 //! Quads that are convex on the surface are convex in UV, so that a result holds by either diagonal.
 
+use std::f64::consts::{PI, TAU};
+
 use ble_unwrap_core::metrics::{Measures, Texture, UvMesh};
 use ble_unwrap_core::standalone::measure_layout;
 use ble_unwrap_core::{Atlas, MeshInput, Progress, Settings, unwrap, verify};
-use ble_unwrap_fixtures::{FlatPolygons, PolyMesh, random, voxels, wrapped_grid};
+use ble_unwrap_fixtures::{FlatPolygons, PolyMesh, grid, voxels, wrapped_grid};
 use nalgebra::Point3;
 use rayon::ThreadPoolBuilder;
+
+/// By the other diagonal a result may be stretched so many times as much.
+const MOST_BETWEEN_DIAGONALS: f64 = 1.05;
 
 fn input_of<'a>(mesh: &'a PolyMesh, flat: &'a FlatPolygons) -> MeshInput<'a> {
     MeshInput {
@@ -63,21 +68,28 @@ fn twisted_tower(storeys: usize, turn: f64) -> PolyMesh {
     })
 }
 
-/// Hills so steep and rough that quads crowd.
-fn rough_hills(n: usize) -> PolyMesh {
-    ble_unwrap_fixtures::grid(n, n, |u, v| {
-        let at = (u * n as f64).round() as u64 * 1000 + (v * n as f64).round() as u64;
-        [u, v, 0.6 / n as f64 * random(5, at) + 0.3 * (9.0 * u).sin() * (7.0 * v).cos()]
+/// Hills so steep for their quads that these crowd where a map flattens them.
+fn steep_hills(n: usize, waves: f64) -> PolyMesh {
+    grid(n, n, |u, v| [u, v, 0.4 * (waves * u + 1.0).sin() * (0.8 * waves * v).cos()])
+}
+
+/// A ball of few quads with dents that are hardly wider than one.
+fn dented_ball() -> PolyMesh {
+    wrapped_grid(12, 6, [true, false], |u, v| {
+        let radius = 1.0 + 0.35 * (7.0 * TAU * u).sin() * (PI * v).sin() * (6.0 * PI * v).cos();
+        let (angle, turn) = (PI * (0.03 + 0.94 * v), TAU * u);
+        [radius * angle.sin() * turn.cos(), radius * angle.sin() * turn.sin(), radius * angle.cos()]
     })
 }
 
+/// All quads of these are convex.
 fn shapes() -> [(&'static str, PolyMesh); 5] {
     [
         ("voxel blob", voxel_blob(10)),
         ("voxel blob with smooth corners", smoothed(voxel_blob(14), 2)),
         ("twisted tower", twisted_tower(10, 0.35)),
-        ("rough hills", rough_hills(24)),
-        ("a tower of few quads", twisted_tower(6, 0.5)),
+        ("steep hills", steep_hills(24, 13.0)),
+        ("dented ball", dented_ball()),
     ]
 }
 
@@ -119,12 +131,24 @@ fn results_hold_by_either_diagonal() {
     for (name, mesh) in shapes() {
         let atlas = unwrapped(&mesh);
         assert_eq!(atlas.report.bent_quads, 0, "{name}");
+        assert_eq!(atlas.report.charts_over_limit, [], "{name}");
         let [one, other] = [0, 1].map(|first| measured(&mesh, &atlas, &triangulated(&mesh, first), name));
         assert_eq!((one.flips, other.flips, one.overlaps, other.overlaps), (0, 0, 0, 0), "{name}");
-        println!("{name}: l2 {} by one diagonal, {} by the other; {:?}", one.l2, other.l2, atlas.report.rungs);
+        // One triangle that is all but turned over can double it.
+        let [better, worse] = [one.l2.min(other.l2), one.l2.max(other.l2)];
+        assert!(worse <= MOST_BETWEEN_DIAGONALS * better, "{name}: {better} by one diagonal, {worse} by the other");
         mended += atlas.report.rungs.iter().filter(|rung| rung.0 == "unbend").map(|rung| rung.1).sum::<usize>();
     }
     assert!(mended > 0, "no quad had to be mended: no test");
+}
+
+#[test]
+fn quads_that_are_not_convex_are_nobodys_fault() {
+    // A tenth of these is not; half a dozen of the others would be bent.
+    let mesh = steep_hills(12, 17.0);
+    let atlas = unwrapped(&mesh);
+    assert_eq!((atlas.report.bent_quads, atlas.report.flips), (0, 0));
+    assert!(!atlas.report.warnings.iter().any(|text| text.contains("quad")), "{:?}", atlas.report.warnings);
 }
 
 #[test]

@@ -72,9 +72,9 @@ impl OtherHalves {
     }
 
     pub(super) fn is_bent(&self, quad: usize, uv: &[Point2<f64>]) -> bool {
-        self.triangles[2 * quad..2 * quad + 2].iter().any(|t| {
+        !self.triangles[2 * quad..2 * quad + 2].iter().all(|t| {
             let [a, b, c] = t.map(|v| uv[v.index()]);
-            !(orientation(a, b, c) > 0.0)
+            orientation(a, b, c) > 0.0
         })
     }
 
