@@ -76,7 +76,7 @@ def with_xatlas(rows, objects, settings):
 def main(argv):
     batch, asset_io = addon_loader.load("batch"), addon_loader.load("asset_io")
     engine, bridge = addon_loader.load("engine"), addon_loader.load("mesh_bridge")
-    targets, arguments = addon_loader.load("targets"), addon_loader.load("batch_arguments")
+    targets, arguments = addon_loader.load("targets"), addon_loader.load("batch.arguments")
     parser = argparse.ArgumentParser(prog="compare.py", description="BLE Unwrap against Smart UV Project and xatlas.")
     parser.add_argument("inputs", nargs="+", metavar="IN")
     parser.add_argument("-o", "--output", required=True, metavar="OUTDIR")
@@ -122,7 +122,7 @@ def main(argv):
     if models:
         print("", *tables.table(models), "", sep="\n")
     report = {"params": settings, "models": models, "left_out": left_out, "failed": failed}
-    addon_loader.load("batch_report").write_json(out / "compare.json", report)
+    addon_loader.load("batch.report").write_json(out / "compare.json", report)
     print(f"written to {out}/")
     if failed:
         return batch.SOME_FAILED

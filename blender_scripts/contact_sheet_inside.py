@@ -183,7 +183,7 @@ def main(argv):
     height = max(cell.shape[0] for cell in cells)
     cells = [np.concatenate([cell, _plain(height - cell.shape[0], cell.shape[1])]) for cell in cells]
     pictures.write_png(options.output, sheet(cells, options.columns))
-    addon_loader.load("batch_report").write_json(
+    addon_loader.load("batch.report").write_json(
         options.output.with_suffix(".json"), {"models": report, "failed": failed}
     )
     print(f"written to {options.output}")

@@ -154,7 +154,7 @@ def main(argv):
         "clouds": clouds,
         "failed": failed,
     }
-    addon_loader.load("batch_report").write_json(out / "report.json", report)
+    addon_loader.load("batch.report").write_json(out / "report.json", report)
     for name in [*models, *clouds]:
         files = [f"{name}.blend"] + [f"{name}_layout.png"] * (name in models) + [f"{name}_render.png"] * options.render
         print("  " + "  ".join(str(out / file) for file in files))

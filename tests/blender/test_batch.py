@@ -146,7 +146,7 @@ def test_resumed_batch_that_is_stopped_forgets_nothing(addon, batch, files, tmp_
 @pytest.mark.skipif(os.name == "nt", reason="no such signals there")
 def test_ignored_signals_stay_ignored(addon):
     """`nohup` and shells ignore signals for what they start; that is not undone."""
-    signals = addon("stop_signals")
+    signals = addon("batch.stop_signals")
     before, of_keyboard = signal.signal(signal.SIGHUP, signal.SIG_IGN), signal.getsignal(signal.SIGINT)
     try:
         with signals.StopRequest() as stop:
@@ -166,7 +166,7 @@ def entry(number):
 
 def test_cost_of_the_report_grows_with_the_work(addon, tmp_path, monkeypatch):
     """10,000 assets of 20 ms each, on a clock that counts a microsecond for each line written: a twentieth at most."""
-    reports = addon("batch_report")
+    reports = addon("batch.report")
     clock = [0.0]
     monkeypatch.setattr(reports.time, "monotonic", lambda: clock[0])
     lines = []
@@ -188,7 +188,7 @@ def test_cost_of_the_report_grows_with_the_work(addon, tmp_path, monkeypatch):
 
 def test_journal_holds_what_the_report_lacks(addon, tmp_path):
     """Also where the process was killed while it wrote a line, or before there was any report."""
-    reports = addon("batch_report")
+    reports = addon("batch.report")
     path = tmp_path / "r.json"
     report = reports.ReportFile(path, {"schema": 2}, {("a", "b"): {"in": "a", "out": "b", "status": "ok"}})
     report.start()
@@ -456,7 +456,7 @@ def test_plans_that_would_lose_a_file_are_wrong_usage(batch, files, arguments, m
 
 def test_a_free_name_is_found_for_each_of_many(addon):
     """Names are found for any number of inputs that meet."""
-    plan, notes = addon("batch_plan").plan_outputs(
+    plan, notes = addon("batch.plan").plan_outputs(
         ["m.stl", "m.gltf", "m.glb", "m.stl.glb", "m.ply"], "out", kind="glb"
     )
     names = [planned.target.name for planned in plan]

@@ -212,7 +212,7 @@ def test_help_lists_every_setting(run_script, addon):
     done = run_script("unwrap.py", "--help")
     assert done.returncode == 0
     for name in addon("properties").annotations():
-        if name not in addon("batch_arguments").EXCLUDED_SETTINGS:
+        if name not in addon("batch.arguments").EXCLUDED_SETTINGS:
             assert "--" + name.replace("_", "-") in done.stdout
 
 

@@ -14,12 +14,13 @@ import traceback
 
 import bpy
 
-from . import asset_io, batch_resume, comparison, engine, mesh_bridge, properties, targets
-from .batch_arguments import make_parser, settings_of
-from .batch_plan import PlanError, is_among, plan_outputs
-from .batch_report import ReportFile, earlier_assets
-from .cloud_task import CloudTask
-from .run import run_objects
+from .. import asset_io, comparison, engine, mesh_bridge, properties, targets
+from ..cloud_task import CloudTask
+from ..run import run_objects
+from . import resume
+from .arguments import make_parser, settings_of
+from .plan import PlanError, is_among, plan_outputs
+from .report import ReportFile, earlier_assets
 from .stop_signals import Stopped, StopRequest
 
 OK, SOME_FAILED, USAGE, ENVIRONMENT, VIOLATED, INTERRUPTED = range(6)
@@ -87,7 +88,7 @@ def show_notes(notes, arguments, indent=""):
 
 def process_all(plan, settings, arguments, earlier, report, stop):
     """Unwraps one file after the other and reports each: their entries, and the name of the signal that stopped it."""
-    evidence = batch_resume.Evidence(settings, options_of(arguments))
+    evidence = resume.Evidence(settings, options_of(arguments))
     assets = []
     try:
         for number, planned in enumerate(plan, 1):
@@ -121,7 +122,7 @@ def process(planned, settings, arguments, evidence, stop):
         # These formats split vertices wherever normals or UVs differ.
         settings = {"weld": asset_io.file_format(source) in asset_io.SPLIT_FORMATS, **settings}
         asset_io.load(source)
-        external = batch_resume.external_files()
+        external = resume.external_files()
         contents = asset_io.prepare(target)
         objects, notes = unwrapped_objects(targets.unique_data(contents.objects), target)
         run, outcomes = run_objects(

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import bpy
 
-from . import asset_io, engine, input_file, properties
-from .batch_plan import files_of
+from .. import asset_io, engine, input_file, properties
+from .plan import files_of
 
 # Of the options: what changes no result.
 IRRELEVANT = ("threads",)

@@ -5,7 +5,7 @@ import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from . import asset_io
+from .. import asset_io
 
 
 class PlanError(Exception):

@@ -2,7 +2,7 @@
 
 import argparse
 
-from . import asset_io, properties
+from .. import asset_io, properties
 
 # No selection and no old place exist for a file.
 EXCLUDED_SETTINGS = ("use_selection",)
