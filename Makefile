@@ -36,10 +36,10 @@ flamegraph:
 	$(CARGO) run --release --locked -p ble_unwrap_core --example flamegraph -- out/flamegraph.svg $(MESH)
 
 scaling: $(VENV)/.wheel $(VENV)/.scaling
-	$(BIN)/python .ci/scaling $(MODELS)
+	$(BIN)/python native/evaluation/scaling $(MODELS)
 
 quality: $(VENV)/.wheel
-	$(BIN)/python .ci/quality $(MODELS) $(if $(SHUFFLES),--shuffles $(SHUFFLES))
+	$(BIN)/python native/evaluation/quality $(MODELS) $(if $(SHUFFLES),--shuffles $(SHUFFLES))
 
 contact-sheet: zip
 	.ci/blender_libraries
@@ -83,12 +83,12 @@ $(VENV)/.ready: .ci/requirements.txt
 	PYTHON="$(PYTHON)" .ci/make_venv $(VENV) -r .ci/requirements.txt
 	touch $@
 
-$(VENV)/.paper: .ci/paper_requirements.txt $(VENV)/.ready
-	$(BIN)/pip install --quiet --disable-pip-version-check -r .ci/paper_requirements.txt
+$(VENV)/.paper: native/paper/requirements.txt $(VENV)/.ready
+	$(BIN)/pip install --quiet --disable-pip-version-check -r native/paper/requirements.txt
 	touch $@
 
-$(VENV)/.scaling: .ci/scaling_requirements.txt $(VENV)/.ready
-	$(BIN)/pip install --quiet --disable-pip-version-check -r .ci/scaling_requirements.txt
+$(VENV)/.scaling: native/evaluation/scaling/requirements.txt $(VENV)/.ready
+	$(BIN)/pip install --quiet --disable-pip-version-check -r native/evaluation/scaling/requirements.txt
 	touch $@
 
 $(WHEELS)/.built: $(NATIVE) $(VENV)/.ready

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 REPO = Path(__file__).resolve().parent.parent
-sys.path.append(str(REPO / ".ci" / "quality"))
+sys.path.append(str(REPO / "native" / "evaluation" / "quality"))
 
 import quality_meshes  # noqa: E402
 import scaling_meshes  # noqa: E402

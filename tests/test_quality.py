@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-QUALITY = ROOT / ".ci/quality"
+QUALITY = ROOT / "native/evaluation/quality"
 sys.path.insert(0, str(QUALITY))
 
 import quality_meshes  # noqa: E402

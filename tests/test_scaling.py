@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-SCALING = ROOT / ".ci/scaling"
+SCALING = ROOT / "native/evaluation/scaling"
 sys.path.insert(0, str(SCALING))
 
 import scaling_meshes  # noqa: E402

@@ -1,6 +1,6 @@
 """`make scaling`: time and peak memory of an unwrap against the number of faces.
 
-python .ci/scaling [MODEL ...] [-o out/scaling] [--largest 1024000] [--threads N] [--no-models]
+python native/evaluation/scaling [MODEL ...] [-o out/scaling] [--largest 1024000] [--threads N] [--no-models]
 
 Generated families from 1,000 faces on, doubling, and models: those given (.obj, .ply, .ply.gz), else those of
 ../shared/models beside this checkout, if it is there. Writes README.md with the table, scaling.png and scaling.json. It
@@ -14,7 +14,7 @@ import json
 import sys
 from pathlib import Path
 
-REPO = Path(__file__).resolve().parent.parent.parent
+REPO = Path(__file__).resolve().parents[3]
 sys.path.append(str(REPO / "native" / "paper"))
 
 import machine

@@ -1,6 +1,6 @@
 """`make quality`: how good atlases are, over several triangulations of each mesh.
 
-python .ci/quality [MODEL ...] [--shuffles 4]
+python native/evaluation/quality [MODEL ...] [--shuffles 4]
 
 Of a single triangulation the number of charts is chance by a few per cent up and down: whether a change is for the
 better shows in the mean over some. Each mesh (models given as .obj, .ply or .ply.gz, else generated ones) is unwrapped

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-REPO = Path(__file__).resolve().parent.parent.parent
+REPO = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(REPO / "blender_scripts"), str(REPO / "native" / "paper")]
 
 import sculpt_mesh  # noqa: E402

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-REPO = Path(__file__).resolve().parent.parent.parent
-sys.path[:0] = [str(REPO / ".ci" / "scaling"), str(REPO / "native" / "paper")]
+REPO = Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(REPO / "native" / "evaluation" / "scaling"), str(REPO / "native" / "paper")]
 
 import scaling_meshes  # noqa: E402
 import shapes  # noqa: E402
