@@ -43,11 +43,11 @@ fn affordable_rise(charts: &[Chart], settings: &Settings) -> f64 {
     let (mut stretch, mut area) = (0.0, 0.0);
     for chart in charts {
         let share = chart.patch.area();
-        stretch += share * chart.l2;
+        stretch += share * chart.l2 * chart.l2;
         area += share;
     }
-    // NaN, of no area, is none.
-    (settings.stretch_limit - stretch / area).max(0.0)
+    // The whole's stretch is the root of that mean, which rises by no more than all charts do. NaN, of no area, is none.
+    (settings.stretch_limit - (stretch / area).sqrt()).max(0.0)
 }
 
 /// A chart, and whether it was bent. A chart under its limit stays under it; of one that is over it no more is asked.

@@ -25,7 +25,7 @@ pub(super) struct Cut {
     pub(super) cost: CutCost,
 }
 
-/// Moves the borders between parts. The capacity is made of the crease 1/(1 + d/mean)ʷ and the misfit
+/// Moves the borders between parts, within the band and over polygons that reach across the middle. The capacity is made of the crease 1/(1 + d/mean)ʷ and the misfit
 /// (gᵢ + gⱼ)/(2·mean), with w the crease weight, d = 1 − cos(dihedral) and g the difference between the errors of a polygon's distances in
 /// the two parts' own embeddings.
 pub(super) fn improve(
@@ -38,7 +38,7 @@ pub(super) fn improve(
     progress: &Progress,
 ) -> Result<(), Cancelled> {
     let bends = Bends::new(mesh, graph, settings.crease_weight);
-    let parts: Vec<Part> = (0..representatives.len())
+    let parts: Vec<Part<'_>> = (0..representatives.len())
         .map(|r| Part::new(mesh, graph, distances, representatives, r, settings.crease_share < 1.0))
         .collect::<Result<_, _>>()?;
     for a in 0..parts.len() {
@@ -52,8 +52,10 @@ pub(super) fn improve(
 }
 
 /// One part as its representative sees it.
-struct Part {
-    /// Mean distance of each polygon to the representative.
+struct Part<'a> {
+    /// Distance of each vertex to the representative.
+    row: &'a [f32],
+    /// Mean distance of each polygon to it.
     reach: Vec<f64>,
     /// Landmarks nearer to this representative than to any other.
     landmarks: Vec<usize>,
@@ -61,11 +63,11 @@ struct Part {
     embedding: Option<Mds>,
 }
 
-impl Part {
+impl<'a> Part<'a> {
     fn new(
         mesh: &TriMesh,
         graph: &PolygonGraph,
-        distances: &LandmarkDistances,
+        distances: &'a LandmarkDistances,
         representatives: &[usize],
         number: usize,
         embed: bool,
@@ -89,7 +91,7 @@ impl Part {
         } else {
             None
         };
-        Ok(Self { reach, landmarks, embedding })
+        Ok(Self { row, reach, landmarks, embedding })
     }
 
     /// Mean squared error of the distances of a polygon to the landmarks of this part, in its
@@ -119,10 +121,23 @@ struct Pair<'a> {
     distances: &'a LandmarkDistances,
     bends: &'a Bends,
     number: [usize; 2],
-    parts: [&'a Part; 2],
+    parts: [&'a Part<'a>; 2],
 }
 
 impl Pair<'_> {
+    /// Whether a polygon has vertices on either side of the bisector. Of triangles as long as the patch the means lie near
+    /// one end or the other, and a border between those would run along all their diagonals.
+    fn reaches_across(&self, polygon: usize) -> bool {
+        let [to_a, to_b] = self.parts.map(|part| part.row);
+        let vertices = self.graph.faces.group(polygon).iter().flat_map(|&f| self.mesh.triangle(f));
+        let (mut first, mut second) = (false, false);
+        for v in vertices {
+            first |= to_a[v.index()] < to_b[v.index()];
+            second |= to_a[v.index()] > to_b[v.index()];
+        }
+        first && second
+    }
+
     fn improve(&self, settings: Cut, label: &mut [u32], progress: &Progress) -> Result<(), Cancelled> {
         let Cut { band, crease_share, cost, .. } = settings;
         let [a, b] = self.number.map(|n| u32::try_from(n).unwrap_or(0));
@@ -132,7 +147,8 @@ impl Pair<'_> {
             let sum = to_a + to_b;
             if sum > 0.0 && sum.is_finite() { (to_a - to_b) / sum } else { 0.0 }
         };
-        let movable = |p: usize| (label[p] == a || label[p] == b) && balance(p).abs() < band;
+        let in_band = |p: usize| balance(p).abs() < band || self.reaches_across(p);
+        let movable = |p: usize| (label[p] == a || label[p] == b) && in_band(p);
         let nodes: Vec<usize> = (0..self.graph.len()).filter(|&p| movable(p)).collect();
         let beyond = |p: usize| if label[p] == a { b } else { a };
         let touches = |p: usize| self.graph.links.group(p).iter().any(|l| label[l.to as usize] == beyond(p));
@@ -176,5 +192,38 @@ impl Pair<'_> {
             label[p] = if on_side_of_a { a } else { b };
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geodesics::{Metric, geodesic_distances};
+    use crate::mesh::{VertexId, test_surfaces};
+    use crate::segmentation::SegmentationSettings;
+
+    /// A tube of one row of triangles as long as itself, and a short row at either end: the border goes round between rows.
+    #[test]
+    fn a_border_does_not_run_along_triangles_that_reach_from_end_to_end() {
+        let tube = test_surfaces::cylinder(12, 3, 3.0);
+        let heights = [0.0, 1.0, 19.0, 20.0];
+        let place = |p: &nalgebra::Point3<f64>| nalgebra::Point3::new(p.x, p.y, heights[p.z.round() as usize]);
+        let positions: Vec<_> = tube.positions().iter().map(place).collect();
+        let triangles: Vec<[u32; 3]> = tube.triangles().iter().map(|t| t.map(|v| v.index() as u32)).collect();
+        let mesh = test_surfaces::mesh(&positions, &triangles);
+        let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
+        let graph = PolygonGraph::new(&mesh, &polygon);
+        let at = |z: f64| mesh.vertices().find(|&v| mesh.position(v).z == z).expect("a vertex");
+        let ends: [VertexId; 2] = [at(0.0), at(20.0)];
+        let distances =
+            geodesic_distances(&mesh, &ends, Metric::FastMarching, &Progress::new()).expect("not cancelled");
+        let mut label = super::super::grow::nearest(&mesh, &graph, &distances, &[0, 1]);
+        let usual = SegmentationSettings::default();
+        let cut = Cut { band: usual.band, crease_share: 1.0, crease_weight: 1.0, cost: usual.cost };
+        improve(&mesh, &graph, &distances, &[0, 1], cut, &mut label, &Progress::new()).expect("not cancelled");
+        let face = |f: crate::mesh::FaceId| label[graph.of_face[f.index()] as usize];
+        let border = mesh.edges().filter(|&h| !mesh.is_boundary(h) && face(h.face()) != face(mesh.twin(h).face()));
+        let lengths: Vec<f64> = border.map(|h| mesh.edge_length(h)).collect();
+        assert!(lengths.len() == 12 && lengths.iter().all(|&l| l < 1.0), "{lengths:?}: the sides of one ring");
     }
 }
