@@ -95,7 +95,6 @@ impl Analysis {
             face_offsets: &self.face_offsets,
             ..MeshInput::default()
         };
-        needs::require(&input, settings)?;
         self.memo.begin();
         self.prepared.unwrap(&input, settings, Clock::new(), &Run::new(progress, Some(&self.memo)))
     }
@@ -166,6 +165,7 @@ impl Prepared {
         mut clock: Clock,
         progress: &Run<'_>,
     ) -> Result<Atlas, UnwrapError> {
+        needs::require(input, self.components.len(), settings)?;
         progress.enter(Stage::Charts);
         let surface = &self.surface;
         let tally = Tally::new(progress, surface.mesh.face_count());

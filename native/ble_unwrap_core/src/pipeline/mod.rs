@@ -57,7 +57,7 @@ use memo::Run;
 pub fn unwrap(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -> Result<Atlas, UnwrapError> {
     progress.check()?;
     settings.validate()?;
-    needs::require(input, settings)?;
+    needs::require(input, 1, settings)?;
     let mut clock = Clock::new();
     progress.enter(Stage::Condition);
     let prepared = Prepared::new(input, &settings.conditioning(), progress)?;

@@ -6,8 +6,11 @@ use crate::mesh::MeshInput;
 use crate::settings::Settings;
 
 /// What a triangle takes at the peak, in bytes: the most that `make scaling` measures on meshes of 64,000 triangles and
-/// more, with a half to spare.
+/// more, with nearly a half to spare.
 const OF_TRIANGLE: u64 = 1536;
+/// What each connected piece takes besides, in bytes: a chart of its own, in many poses while packing is searched. 20,000
+/// triangles apart take 7.4 KiB each in all.
+const OF_PIECE: u64 = 8 << 10;
 /// What each thread takes besides, whatever the mesh: its stack, its share of the allocator's address space, its scratch
 /// arrays.
 const OF_THREAD: u64 = 80 << 20;
@@ -15,18 +18,20 @@ const OF_THREAD: u64 = 80 << 20;
 /// eigenvectors and their scratch.
 const SQUARES: u64 = 8;
 
-/// Fails if an unwrap of a mesh is going to take more memory than the platform says is left.
-pub(super) fn require(input: &MeshInput<'_>, settings: &Settings) -> Result<(), OutOfMemory> {
-    memory::require(of_unwrap(input, settings))
+/// Fails if an unwrap of a mesh of so many connected pieces, as far as that is known, is going to take more memory than the
+/// platform says is left.
+pub(super) fn require(input: &MeshInput<'_>, pieces: usize, settings: &Settings) -> Result<(), OutOfMemory> {
+    memory::require(of_unwrap(input, pieces, settings))
 }
 
 /// An estimate on the safe side, in bytes. Textures do not enter: the grids of packing have a bounded number of cells.
-fn of_unwrap(input: &MeshInput<'_>, settings: &Settings) -> u64 {
+fn of_unwrap(input: &MeshInput<'_>, pieces: usize, settings: &Settings) -> u64 {
     let faces = input.face_offsets.len().saturating_sub(1);
     let triangles = input.corner_vertices.len().saturating_sub(2 * faces) as u64;
     let threads = rayon::current_num_threads();
     let landmarks = if settings.coarse { 0 } else { of_landmarks(input.positions.len(), settings) };
     (triangles.saturating_mul(OF_TRIANGLE))
+        .saturating_add((pieces as u64).saturating_mul(OF_PIECE))
         .saturating_add(landmarks)
         .saturating_add((threads as u64).saturating_mul(OF_THREAD))
         .saturating_add(bytes_of_packing_buffers(threads))
@@ -56,7 +61,7 @@ mod tests {
             face_offsets: &offsets,
             ..MeshInput::default()
         };
-        of_unwrap(&input, settings)
+        of_unwrap(&input, 1, settings)
     }
 
     #[test]
