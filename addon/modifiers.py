@@ -5,7 +5,7 @@ import hashlib
 import bpy
 import numpy as np
 
-from . import mesh_bridge, targets
+from . import mesh_arrays, mesh_bridge, targets
 
 # Modifiers that leave faces, corners and UVs as they are: they move vertices, weight them, or make no mesh at all.
 KEEP_CORNERS = frozenset({
@@ -84,8 +84,8 @@ def apply(objects, layer, *, keeps_pose):
 def _digest(mesh):
     """What tells two results of the same mesh apart: corners, places and materials."""
     digest = hashlib.blake2b(mesh_bridge.fingerprint(mesh), digest_size=16)
-    digest.update(mesh_bridge.read_positions(mesh).tobytes())
-    digest.update(mesh_bridge.read_array(mesh.polygons, "material_index", np.int32).tobytes())
+    digest.update(mesh_arrays.read_positions(mesh).tobytes())
+    digest.update(mesh_arrays.read_array(mesh.polygons, "material_index", np.int32).tobytes())
     return digest.digest()
 
 

@@ -1,8 +1,8 @@
 """All that one press of the button does: the surfaces together, then every cloud by itself, written all or none."""
 
-from . import cloud_bridge, engine, mesh_bridge, modifiers, targets
+from . import cloud_bridge, engine, modifiers, targets, uv_maps
 from .cloud_task import CloudTask
-from .mesh_bridge import MeshError, NothingToUnwrap
+from .mesh_arrays import MeshError, NothingToUnwrap
 from .task import UnwrapTask, finished
 
 # Parts below this many faces or points are computed while they are asked for: not worth a thread and a wait each.
@@ -27,7 +27,7 @@ class Run:
                 obj.update_from_editmode()  # faces may have been made or deleted since edit mode was entered
         self.tasks, self.notes = [], []
         reasons = []
-        objects, refused = _writable(objects, make_new_map=settings.get("uv_map") == "NEW")
+        objects, refused = _writable(objects, uv_maps.chosen(settings))
         surfaces = [obj for obj in objects if targets.is_surface(obj)]
         for group in [surfaces] if one_atlas and surfaces else [[obj] for obj in surfaces]:
             try:
@@ -160,13 +160,13 @@ class RunJob:
             raise self._error
 
 
-def _writable(objects, *, make_new_map):
+def _writable(objects, choice):
     """The objects whose maps can be written, and why the others' cannot."""
     writable, refused = [], []
     for obj in objects:
         try:
             if targets.is_surface(obj):
-                mesh_bridge.check_writable(obj, make_new_map)
+                uv_maps.check_writable(obj, choice)
             elif targets.is_cloud(obj):
                 cloud_bridge.check_writable(obj)
             writable.append(obj)

@@ -49,7 +49,7 @@ class UnwrapTask:
     def __init__(self, objects, settings, *, threads=0, keep=False, by_uv=False):
         self.objects = list(objects)
         self.settings = {**properties.default_values(settings.get("preset", "DEFAULT")), **settings}
-        self.target = uv_maps.MapChoice(self.settings["uv_map"] == "NEW", self.settings["uv_map_name"])
+        self.target = uv_maps.chosen(self.settings)
         self.selection = mesh_bridge.gather(
             objects,
             only_selected=self.settings["use_selection"],

@@ -19,6 +19,11 @@ class MapChoice:
     name: str = DEFAULT_NAME
 
 
+def chosen(settings):
+    """The map that settings ask for, missing ones at their defaults."""
+    return MapChoice(settings.get("uv_map") == "NEW", settings.get("uv_map_name", DEFAULT_NAME))
+
+
 def group_names(obj):
     """Names of an object's vertex groups, which Blender gives to no UV map of its mesh."""
     return frozenset(group.name for group in obj.vertex_groups)
