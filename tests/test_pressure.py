@@ -94,7 +94,8 @@ def test_many_small_charts_have_a_worst():
     rng = np.random.default_rng(3)
     positions = rng.random((count, 1, 3)) * 100 + np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
     corners = np.arange(3 * count, dtype=np.int32)
-    report = unwrap(positions.reshape(-1, 3), corners, [*corners[::3].tolist(), 3 * count], texture_size=4096, margin=0)
+    offsets = np.arange(0, 3 * count + 1, 3)
+    report = unwrap(positions.reshape(-1, 3), corners, offsets, texture_size=4096, margin=0)
     assert report["charts"] == count and np.isfinite(report["l2_worst_chart"])
 
 

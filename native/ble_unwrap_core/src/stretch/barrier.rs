@@ -54,6 +54,27 @@ struct Contact {
     normal: Vector2<f64>,
 }
 
+/// A box around what moves, with room for what counts as a contact beyond its ends.
+struct Swept {
+    low: Point2<f64>,
+    high: Point2<f64>,
+}
+
+impl Swept {
+    fn new(hull: &[Point2<f64>]) -> Self {
+        let low = hull.iter().skip(1).fold(hull[0], |low, p| low.inf(p));
+        let high = hull.iter().skip(1).fold(hull[0], |high, p| high.sup(p));
+        // No edge is longer than the box's two sides together at any time on its way.
+        let room = Vector2::repeat(2.0 * CONTACT_SLACK * ((high - low).sum() + f64::MIN_POSITIVE));
+        Self { low: low - room, high: high + room }
+    }
+
+    #[inline]
+    fn meets(&self, other: &Self) -> bool {
+        (0..2).all(|k| self.low[k] <= other.high[k] && other.low[k] <= self.high[k])
+    }
+}
+
 impl Barrier {
     pub(super) fn new(mesh: &TriMesh, rest: &[RestTriangle], reach: f64) -> Self {
         let edges: Vec<HalfedgeId> = mesh.halfedges().filter(|&h| mesh.is_boundary(h)).collect();
@@ -168,12 +189,15 @@ impl Barrier {
                 most *= 0.5;
                 continue;
             };
+            // Near a long edge or a long way there are many more pairs than ever come close to meeting.
+            let swept: Vec<Swept> = (0..self.edges.len()).map(|i| Swept::new(&hull(i))).collect();
             let mut least = most;
             for vertex in 0..self.edges.len() {
                 let v = self.from[vertex] as usize;
+                let way = Swept::new(&[uv[v], moved[v]]);
                 grid.near(&[uv[v], moved[v]], |edge| {
                     let edge = edge as usize;
-                    if !self.is_end(vertex, edge) {
+                    if way.meets(&swept[edge]) && !self.is_end(vertex, edge) {
                         least = self.contact_time(uv, direction, vertex, edge, least);
                     }
                 });
