@@ -95,7 +95,7 @@ def test_many_small_charts_have_a_worst():
     positions = rng.random((count, 1, 3)) * 100 + np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
     corners = np.arange(3 * count, dtype=np.int32)
     offsets = np.arange(0, 3 * count + 1, 3)
-    report = unwrap(positions.reshape(-1, 3), corners, offsets, texture_size=4096, margin=0)
+    report = unwrap(positions.reshape(-1, 3), corners, offsets, texture_size=4096, margin=0).report
     assert report["charts"] == count and np.isfinite(report["l2_worst_chart"])
 
 
