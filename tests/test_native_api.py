@@ -349,7 +349,7 @@ def test_settings_that_contradict_each_other_are_named(square):
 def test_measure_agrees_with_the_report_of_unwrap(ball):
     atlas = native.unwrap(*ball, texture_size=256, margin=2)
     measured = native.measure(*ball, atlas.uv, texture_size=256, margin=2)
-    for key in ("charts", "faces", "unmapped_faces", "flips", "overlaps"):
+    for key in ("charts", "faces", "unmapped_faces", "flips", "bent_quads", "overlaps"):
         assert measured[key] == atlas.report[key], key
     for key in ("l2", "l2_chart_scale", "l2_worst_chart", "l_infinity", "angle_distortion", "area_distortion"):
         assert measured[key] == pytest.approx(atlas.report[key], rel=1e-9), key
@@ -366,6 +366,10 @@ def test_measure_knows_a_bad_layout(square):
     good = native.measure(positions, corners, offsets, uv)
     assert (good["charts"], good["flips"], good["overlaps"], good["unmapped_faces"]) == (1, 0, 0, 0)
     assert good["l2"] == pytest.approx(1) and good["packing_efficiency"] == pytest.approx(1)
+    assert good["bent_quads"] == 0
+    bent = uv.copy()
+    bent[2] = [0.4, 0.4] @ np.stack([uv[1] - uv[0], uv[3] - uv[0]]) + uv[0]
+    assert native.measure(positions, corners, offsets, bent)["bent_quads"] == 1
     np.testing.assert_allclose(good["uv_box"], [[0, 0], [1, 1]])
     stacked = uv.copy()
     stacked[4:] = uv[:4]

@@ -23,7 +23,12 @@ const RINGS: [usize; 3] = [2, 5, 12];
 /// its limit.
 const WEIGHTS: [f64; 3] = [1.0, 0.1, 0.01];
 /// Where all bent quads together do so still, so many at most are mended one by one.
-const MOST_SINGLY: usize = 64;
+const MOST_SINGLY: usize = 16;
+/// Quads that are crowded but not bent are left alone where they are more than this share of all: that is then how the surface
+/// is, and would cost as much as another minimisation of the chart,
+const MOST_CROWDED: f64 = 0.1;
+/// which is nothing where they are no more than this.
+const ALWAYS_FEW: f64 = 50.0;
 
 /// A map whose quads are less bent.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,33 +69,37 @@ pub fn unbend(
     let mut uv = start.to_vec();
     let scale = (surface_area(rest) / plane_area(mesh, &uv)).sqrt();
     rescale(mesh, &mut uv, scale, true);
-    if halves.crowded(mesh, rest, &uv).is_empty() {
+    let bent = halves.bent(&uv);
+    let mut bad = halves.crowded(mesh, rest, &uv);
+    if (bad.len() - bent.len()) as f64 > (MOST_CROWDED * quads.len() as f64).max(ALWAYS_FEW) {
+        bad.clone_from(&bent);
+    }
+    if bad.is_empty() {
         return Ok(None);
     }
-    let bent = halves.bent(&uv);
-    let found = |uv: Vec<Point2<f64>>| Some(Unbent { left: halves.bent(&uv).len(), uv });
+    let found = |uv: Vec<Point2<f64>>| Unbent { left: halves.bent(&uv).len(), uv };
     let mut mending = Mending { mesh, rest, halves: halves.clone(), settings, progress };
+    let mut lightest = None;
     for weight in WEIGHTS {
         mending.halves = halves.weighing(weight);
-        let all = |uv: &[Point2<f64>]| halves.crowded(mesh, rest, uv);
-        let Some(mended) = mending.mend(&uv, &all)? else { continue };
-        if is_allowed(&mended) {
-            return Ok(found(mended));
+        lightest = mending.mend(&uv, &bad)?;
+        if let Some(mended) = lightest.take_if(|uv| is_allowed(uv)) {
+            return Ok(Some(found(mended)));
         }
-        // Nothing less will do for these.
-        let settled = if weight == WEIGHTS[2] { mending.settle(&mended)? } else { None };
-        if let Some(settled) = settled.filter(|uv| is_allowed(uv)) {
-            return Ok(found(settled));
-        }
+    }
+    let settled = lightest.map(|uv| mending.settle(&uv)).transpose()?.flatten();
+    if let Some(settled) = settled.filter(|uv| is_allowed(uv)) {
+        return Ok(Some(found(settled)));
     }
     // What can be had of them.
     let mut best = None;
     for &quad in bent.iter().take(MOST_SINGLY) {
         let from = best.as_ref().unwrap_or(&uv);
-        let this = |uv: &[Point2<f64>]| if halves.is_bent(quad, uv) { vec![quad] } else { Vec::new() };
-        best = mending.mend(from, &this)?.filter(|uv| is_allowed(uv)).or(best);
+        if halves.is_bent(quad, from) {
+            best = mending.mend(from, &[quad])?.filter(|uv| is_allowed(uv)).or(best);
+        }
     }
-    Ok(best.and_then(found))
+    Ok(best.map(found))
 }
 
 /// What mending works on.
@@ -103,32 +112,35 @@ struct Mending<'a> {
 }
 
 impl Mending<'_> {
-    /// Mends the quads that `bad` finds in a map, until it finds no more; `None` where it finds as many as before.
-    fn mend(
-        &self,
-        uv: &[Point2<f64>],
-        bad: &dyn Fn(&[Point2<f64>]) -> Vec<usize>,
-    ) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
-        let mut best = None;
-        for rings in RINGS {
+    /// Mends some quads; those that are crowded still once more, and those that are bent still as often as there are wider
+    /// neighbourhoods. `None` where nothing gets better.
+    fn mend(&self, uv: &[Point2<f64>], quads: &[usize]) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
+        let mut best = self.mend_near(uv, quads, RINGS[0])?;
+        for (round, &rings) in RINGS.iter().enumerate().skip(1) {
             let from = best.as_deref().unwrap_or(uv);
-            let quads = bad(from);
-            if quads.is_empty() {
+            let crowded = self.halves.crowded(self.mesh, self.rest, from);
+            let is_left =
+                |quad: &usize| self.halves.is_bent(*quad, from) || round == 1 && crowded.binary_search(quad).is_ok();
+            let left: Vec<usize> = quads.iter().copied().filter(is_left).collect();
+            if left.is_empty() {
                 break;
             }
-            let is_better = |uv: &[Point2<f64>]| bad(uv).len() < quads.len();
-            best = self.mend_near(from, &quads, rings, &is_better)?.or(best);
+            best = self.mend_near(from, &left, rings)?.or(best);
         }
         Ok(best)
     }
 
-    /// Mends the neighbourhoods of some quads, all at once.
+    /// How many quads are bent, and how many of these and the crowded ones there are.
+    fn faults(&self, uv: &[Point2<f64>]) -> (usize, usize) {
+        (self.halves.bent(uv).len(), self.halves.crowded(self.mesh, self.rest, uv).len())
+    }
+
+    /// Mends the neighbourhoods of some quads, all at once; `None` where there are no fewer faults then.
     fn mend_near(
         &self,
         uv: &[Point2<f64>],
         quads: &[usize],
         rings: usize,
-        is_better: &dyn Fn(&[Point2<f64>]) -> bool,
     ) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
         let mut bad = vec![false; self.mesh.face_count()];
         for quad in quads.iter().map(|&k| self.halves.quads()[k]) {
@@ -140,7 +152,7 @@ impl Mending<'_> {
         let within = self.halves.part(self.mesh, &near);
         let border: Vec<bool> =
             near.mesh.vertices().map(|v| near.pinned[v.index()] || near.mesh.is_boundary_vertex(v)).collect();
-        let bent = self.halves.bent(uv).len();
+        let faults = self.faults(uv);
         // Where a border that moves would run over another it stays.
         for pinned in [&near.pinned, &border] {
             // Cleared by what both diagonals ask for alike, whatever they count afterwards.
@@ -155,8 +167,7 @@ impl Mending<'_> {
             let mut moved = uv.to_vec();
             near.write(&relaxed, &mut moved);
             if first_flip(self.mesh, &moved).is_none()
-                && self.halves.bent(&moved).len() <= bent
-                && is_better(&moved)
+                && self.faults(&moved) < faults
                 && boundary_is_simple(self.mesh, &moved)
             {
                 return Ok(Some(moved));
@@ -235,6 +246,22 @@ mod tests {
             assert_eq!(got, Ok(None));
         }
         assert_eq!(unbend(&mesh, &rest, &[], &flat, &|_| true, &settings, &Progress::new()), Ok(None));
+    }
+
+    #[test]
+    fn a_map_that_may_not_be_had_is_not_taken() {
+        let (mesh, quads, flat) = sheet(8);
+        let rest = RestTriangle::of_mesh(&mesh);
+        let start = pushed(&flat, 4.0, 4.0, 0.6);
+        let settings = StretchSettings::default();
+        let with = |is_allowed: &dyn Fn(&[Point2<f64>]) -> bool| {
+            unbend(&mesh, &rest, &quads, &start, is_allowed, &settings, &Progress::new()).expect("runs")
+        };
+        assert_eq!(with(&|_| false), None);
+        // Only the plainest stretch, of the whole sheet, comes so near to none.
+        let limit = 1.0 + 1e-9;
+        let got = with(&|uv| crate::stretch::l2_stretch(&mesh, &rest, uv) <= limit).expect("flat");
+        assert_eq!(got.left, 0);
     }
 
     #[test]
