@@ -42,7 +42,7 @@ def regular_size(path, name=None):
         text = getattr(error, "strerror", None) or error
         raise AssetError(f"{what} cannot be read: {text}".strip()) from error
     if not stat.S_ISREG(found.st_mode):
-        raise AssetError(f"{what} is not an ordinary file".strip())
+        raise AssetError(f"{what} is not a regular file".strip())
     return found.st_size
 
 

@@ -157,6 +157,8 @@ def _why_not_replaced(planned):
     there = next((file for file in files_of(planned.target) if os.path.lexists(file)), None)
     if there is None:
         return None
+    if there.is_dir():
+        return f"{there} cannot be written: there is a folder of that name; give another -o"
     return (
         f"{there} exists and is not known as a result of {planned.source.name}, so it is left as it is: give another "
         "-o, the --report of the run that wrote it, or --overwrite"

@@ -104,17 +104,17 @@ def test_devices_and_pipes_are_refused(addon, tmp_path):
     document = json.loads(source.read_text())
     document["buffers"][0]["uri"] = "pipe"
     source.write_text(json.dumps(document))
-    assert "is not an ordinary file" in refused(addon, tmp_path, source)
+    assert "not a regular file" in refused(addon, tmp_path, source)
     for line in ("mtllib pipe", "mtllib /dev/zero", "mtllib \\\n/dev/zero", "  mtllib a.mtl"):
         (folder / "a.mtl").write_text("newmtl m\nmap_Kd -s 1 1 1 pipe\n")
         (folder / "b.obj").write_text(f"{line}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n")
-        assert "is not an ordinary file" in refused(addon, tmp_path, folder / "b.obj")
+        assert "not a regular file" in refused(addon, tmp_path, folder / "b.obj")
     (folder / "c.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     os.mkfifo(folder / "c.mtl")  # which Blender reads without being told to
-    assert "is not an ordinary file" in refused(addon, tmp_path, folder / "c.obj")
+    assert "not a regular file" in refused(addon, tmp_path, folder / "c.obj")
     for kind in ("ply", "blend", "stl"):
         os.mkfifo(folder / f"p.{kind}")
-        with pytest.raises(addon("asset_io").AssetError, match="is not an ordinary file"):
+        with pytest.raises(addon("asset_io").AssetError, match="not a regular file"):
             addon("asset_io").load(folder / f"p.{kind}")
 
 
