@@ -2,6 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use ble_unwrap_core::mesh::ConditionOptions;
 use ble_unwrap_core::metrics::{Measures, Texture, UvMesh};
 use ble_unwrap_core::standalone::measure_layout;
 use ble_unwrap_core::{Atlas, MeshInput, Progress, Settings, unwrap, verify};
@@ -120,7 +121,8 @@ fn measured(mesh: &PolyMesh, atlas: &Atlas, triangles: &[[i32; 3]], name: &str) 
     let certificate = verify(&uv_mesh, &[], &Progress::new()).expect("not cancelled");
     assert!(certificate.is_valid(), "{name}: {certificate:?}");
     let input = MeshInput { corner_triangles: Some(triangles), ..input_of(mesh, &flat) };
-    let layout = measure_layout(&input, &atlas.uv, None, texture, &Progress::new()).expect("measures");
+    let layout = measure_layout(&input, &atlas.uv, None, &ConditionOptions::default(), texture, &Progress::new())
+        .expect("measures");
     assert_eq!((layout.bent_quads, layout.unmapped_faces), (0, 0), "{name}");
     layout.measures
 }

@@ -2,11 +2,11 @@
 
 use ble_unwrap_core::standalone::{self, FlattenReport, MapQuality};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyType};
+use pyo3::types::{PyBool, PyDict};
 
 use crate::errors::Failure;
 use crate::job::Job;
-use crate::owned_array::Array;
+use crate::owned_array::{Array, Reduced};
 use crate::report;
 use crate::settings::{self, Function};
 use crate::unwrap::MeshArrays;
@@ -39,7 +39,7 @@ impl Flattening {
     }
 
     /// For `pickle` and `copy`.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (Py<Array>, Py<Array>, Py<PyDict>)) {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py, (Py<Array>, Py<Array>, Py<PyDict>)> {
         let (py, of) = (slf.py(), slf.get());
         (slf.get_type(), (of.embedded.clone_ref(py), of.uv.clone_ref(py), of.report.clone_ref(py)))
     }

@@ -2,12 +2,12 @@
 
 use ble_unwrap_core::standalone::repack;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyType};
+use pyo3::types::PyDict;
 
 use crate::arrays::{self, Argument};
 use crate::errors::Failure;
 use crate::job::Job;
-use crate::owned_array::Array;
+use crate::owned_array::{Array, Reduced};
 use crate::settings::{self, Function};
 
 /// Charts in their new places.
@@ -34,7 +34,7 @@ impl PackedCharts {
     }
 
     /// For `pickle` and `copy`.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (Py<Array>, Py<PyDict>)) {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py, (Py<Array>, Py<PyDict>)> {
         let (py, of) = (slf.py(), slf.get());
         (slf.get_type(), (of.uv.clone_ref(py), of.report.clone_ref(py)))
     }

@@ -2,12 +2,12 @@
 
 use ble_unwrap_core::MeshInput;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyType};
+use pyo3::types::PyDict;
 
 use crate::arrays::{self, Argument};
 use crate::errors::Failure;
 use crate::job::Job;
-use crate::owned_array::Array;
+use crate::owned_array::{Array, Reduced};
 use crate::report;
 use crate::settings::{self, Function};
 
@@ -45,7 +45,7 @@ impl Atlas {
     }
 
     /// For `pickle` and `copy`.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, Parts) {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py, Parts> {
         let (py, of) = (slf.py(), slf.get());
         let parts =
             (of.uv.clone_ref(py), of.chart.clone_ref(py), of.report.clone_ref(py), of.certificate.clone_ref(py));

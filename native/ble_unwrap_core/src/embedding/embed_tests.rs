@@ -4,7 +4,8 @@ use nalgebra::Point2;
 use proptest::prelude::*;
 
 use super::affinity::{Kernel, KernelWidth};
-use super::embed::{EmbedOptions, Embedding, embed};
+use super::embed::{EmbedOptions, embed};
+use super::embedded::Embedding;
 use super::error::EmbeddingError;
 use super::flat_shapes::{disc, ell, misfit, rectangle};
 use super::input::{EmbedInput, PointMetric};

@@ -167,8 +167,8 @@ fn quads_that_plain_rounding_bends_are_mended() {
         };
         halves.iter().filter(is_turned).count()
     };
-    let plain = round_to_f32(&mesh, &[], &uv, &ROUNDING).expect("nothing to mend");
-    let kept = round_to_f32(&mesh, &halves, &uv, &ROUNDING).expect("no face is lost");
+    let plain = round_to_f32(&mesh, &[], &uv, &ROUNDING, &Progress::new()).expect("nothing to mend");
+    let kept = round_to_f32(&mesh, &halves, &uv, &ROUNDING, &Progress::new()).expect("no face is lost");
     assert_eq!(plain.moved, 0);
     assert!(turned(&plain.uv) > 10, "{}", turned(&plain.uv));
     assert_eq!(turned(&kept.uv), 0);
@@ -180,6 +180,6 @@ fn no_face_is_given_up_for_a_bent_quad() {
     // Bent by far more than rounding may move a vertex.
     let (mesh, uv, halves) = nearly_bent(3, -0.2);
     let uv = placed(&uv, 0.1, [0.1, 0.2]);
-    let kept = round_to_f32(&mesh, &halves, &uv, &ROUNDING).expect("no face is lost");
+    let kept = round_to_f32(&mesh, &halves, &uv, &ROUNDING, &Progress::new()).expect("no face is lost");
     assert!(all_positive(&mesh, &kept.uv));
 }
