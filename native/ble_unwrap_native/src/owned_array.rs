@@ -12,6 +12,9 @@ use crate::errors::InvalidArgumentError;
 /// What `__reduce__` gives to `pickle` and `copy`: the class and what it is made of.
 pub(crate) type Reduced<'py, Parts> = (Bound<'py, PyType>, Parts);
 
+/// Bytes, format and shape of an array.
+type ArrayParts<'py> = (Bound<'py, PyBytes>, String, Bound<'py, PyTuple>);
+
 /// A read-only array of numbers that a computation returned.
 ///
 /// ``numpy.asarray(array)`` and ``memoryview(array)`` see the memory itself, without a copy, and keep
@@ -152,9 +155,7 @@ impl Array {
     }
 
     /// For `pickle` and `copy`.
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<Reduced<'py, (Bound<'py, PyBytes>, String, Bound<'py, PyTuple>)>> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py, ArrayParts<'py>>> {
         let (py, array) = (slf.py(), slf.get());
         let bytes: Vec<u8> = match &array.elements {
             Elements::F32(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
