@@ -30,9 +30,9 @@ const LEAST_SELF_BORDER: f64 = 0.5;
 const GOOD_FILL: f64 = 0.6;
 /// The cut runs in so much of the length around the middle.
 const MIDDLE: [f64; 2] = [0.4, 0.6];
-/// A cut is no longer than so many times the width of the chart: a straight one is as long as the chart is wide, and one along the
-/// sides of a triangulation up to about 1.4 times that. What is longer runs along the chart, as the diagonals of triangles do that
-/// are as long as the chart itself.
+/// A cut is no longer than so many times the mean width of the chart, its area over its length: a straight one across a strip is
+/// as long as that, and one along the sides of a triangulation up to about 1.4 times. What is longer runs along the chart, as
+/// the diagonals of triangles do that are as long as the chart itself.
 const MOST_CUT: f64 = 1.5;
 /// A cut is worth its seam if a texture that holds the parts needs at most this share of the length of one that holds the chart. A cut in
 /// the middle of a strip comes to 0.5 to 0.6.
@@ -143,8 +143,8 @@ fn halves(
     let crease_weight = settings.segmentation.crease_weight;
     let parts = segmentation::between(&patch.mesh, &patch.polygon, [&ends[0], &ends[1]], crease_weight, progress)?;
     let Some(parts) = parts else { return Ok(None) };
-    let width = extent(uv, Vector2::new(-along.y, along.x));
-    if border_length(&patch.mesh, &parts.label) > MOST_CUT * width {
+    let mean_width = patch.area() / extent(uv, along);
+    if border_length(&patch.mesh, &parts.label) > MOST_CUT * mean_width {
         return Ok(None);
     }
     let mut charts = Vec::new();
