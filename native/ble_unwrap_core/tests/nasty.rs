@@ -1,6 +1,6 @@
 //! The whole pipeline on every kind of mesh: each result is proven, whatever went in.
 
-use ble_unwrap_core::mesh::{ConditionOptions, MeshInput, condition};
+use ble_unwrap_core::mesh::{MeshInput, condition};
 use ble_unwrap_core::metrics::{Measures, Texture, UvMesh, measure};
 use ble_unwrap_core::{Atlas, Certificate, ChartScale, Holes, Progress, Settings, unwrap, verify};
 use ble_unwrap_fixtures::{FlatPolygons, PolyMesh, book, catalogue, fin, grid, ico_sphere, sculpt_like, soup, torus};
