@@ -2,24 +2,26 @@
 
 use std::f64::consts::TAU;
 
-use ble_unwrap_core::{MeshInput, Progress, Settings, unwrap};
+use ble_unwrap_core::{Atlas, MeshInput, Progress, Settings, unwrap};
 use ble_unwrap_fixtures::{PolyMesh, capped_cylinder, ico_sphere, torus, wrapped_grid};
 
 /// A chart of less than this share of the faces is a sliver on these shapes.
 const SLIVER: f64 = 0.02;
 
-/// Number of charts, after checks that none is a sliver and that all are under the limit.
-fn charts(mesh: &PolyMesh, name: &str) -> usize {
+fn unwrapped(mesh: &PolyMesh) -> Atlas {
     let flat = mesh.flat();
     let input = MeshInput {
         positions: &mesh.positions,
         corner_vertices: &flat.corner_vertices,
         face_offsets: &flat.face_offsets,
-        corner_triangles: None,
-        seams: &[],
-        guides: &[],
+        ..MeshInput::default()
     };
-    let atlas = unwrap(&input, &Settings::default(), &Progress::new()).expect("unwraps");
+    unwrap(&input, &Settings::default(), &Progress::new()).expect("unwraps")
+}
+
+/// Number of charts, after checks that none is a sliver and that all are under the limit.
+fn charts(mesh: &PolyMesh, name: &str) -> usize {
+    let atlas = unwrapped(mesh);
     let count = atlas.chart.iter().max().map_or(0, |c| *c as usize + 1);
     let mut faces = vec![0usize; count];
     for &c in &atlas.chart {
@@ -55,4 +57,45 @@ fn few_charts_and_no_slivers() {
         let count = charts(&mesh, name);
         assert!(count <= most, "{name}: {count} charts");
     }
+}
+
+/// A tube around z whose side faces are as long as itself, as quads or as triangles; with caps or open.
+fn prism(sides: usize, [base, top]: [f64; 2], radius: f64, caps: bool, triangles: bool) -> PolyMesh {
+    let n = sides as u32;
+    let ring = |z: f64| {
+        (0..sides)
+            .map(move |k| (TAU * k as f64 / sides as f64).sin_cos())
+            .map(move |(s, c)| [radius * c, radius * s, z])
+    };
+    let positions = ring(base).chain(ring(top)).collect();
+    let side = |k: u32| vec![k, (k + 1) % n, n + (k + 1) % n, n + k];
+    let mut faces: Vec<Vec<u32>> = (0..n).map(side).collect();
+    if caps {
+        faces.push((0..n).rev().collect());
+        faces.push((n..2 * n).collect());
+    }
+    let quads = PolyMesh { positions, faces };
+    if triangles { quads.triangulated() } else { quads }
+}
+
+/// Faces as long as the whole shape: no cut runs along their diagonals, and triangles come out as their quads do.
+#[test]
+fn long_faces_stay_together() {
+    for triangles in [false, true] {
+        let kind = if triangles { "triangles" } else { "quads" };
+        let pipe = unwrapped(&prism(12, [0.0, 16.0], 1.0, false, triangles)).report;
+        assert!(pipe.charts == 1 && pipe.l2 < 1.001, "pipe of {kind}: {} charts, {}", pipe.charts, pipe.l2);
+        assert!(pipe.packing_efficiency >= 0.35 && pipe.seam_length <= 2.5, "pipe of {kind}: {}", pipe.seam_length);
+        let beam = unwrapped(&prism(4, [0.0, 12.0], 1.0, true, triangles)).report;
+        assert!(beam.charts <= 2 && beam.seam_length <= 3.0, "beam of {kind}: {}, {}", beam.charts, beam.seam_length);
+        let post = prism(12, [0.0, 60.0], 1.0, true, triangles).joined(&prism(12, [60.0, 63.0], 1.5, true, triangles));
+        let post = unwrapped(&post).report;
+        assert!(post.charts <= 6 && post.seam_length <= 10.0, "post of {kind}: {}, {}", post.charts, post.seam_length);
+        assert!(post.packing_efficiency >= 0.15, "post of {kind}: {}", post.packing_efficiency);
+    }
+    let plank = PolyMesh {
+        positions: vec![[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [8.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+        faces: vec![vec![0, 1, 2], vec![0, 2, 3]],
+    };
+    assert_eq!(unwrapped(&plank).report.charts, 1);
 }

@@ -105,13 +105,13 @@ fn hold(uv: &[Point2<f64>], [width, height]: [f64; 2]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// The direction in which points extend furthest.
-fn longest(uv: &[Point2<f64>]) -> Vector2<f64> {
-    let further = |best: (f64, Vector2<f64>), along| {
-        let extent = extent(uv, along);
-        if extent > best.0 { (extent, along) } else { best }
+/// The direction across which points extend least: along a strip, where the one in which they extend furthest is a diagonal.
+fn axis(uv: &[Point2<f64>]) -> Vector2<f64> {
+    let narrower = |best: (f64, Vector2<f64>), along: Vector2<f64>| {
+        let width = extent(uv, Vector2::new(-along.y, along.x));
+        if width < best.0 { (width, along) } else { best }
     };
-    directions().fold((0.0, Vector2::x()), further).1
+    directions().fold((f64::INFINITY, Vector2::x()), narrower).1
 }
 
 fn directions() -> impl Iterator<Item = Vector2<f64>> {
@@ -138,7 +138,7 @@ fn halves(
     progress: &Run<'_>,
 ) -> Result<Option<Vec<Chart>>, Cancelled> {
     let (patch, uv) = (&chart.patch, &chart.uv);
-    let along = longest(uv);
+    let along = axis(uv);
     let ends = ends(patch, uv, along);
     let crease_weight = settings.segmentation.crease_weight;
     let parts = segmentation::between(&patch.mesh, &patch.polygon, [&ends[0], &ends[1]], crease_weight, progress)?;
