@@ -114,6 +114,12 @@ impl<'a> Part<'a> {
     }
 }
 
+/// Where something lies between two representatives at these distances: −1 at the first, 0 on the bisector, 1 at the second.
+fn balance(to_first: f64, to_second: f64) -> f64 {
+    let sum = to_first + to_second;
+    if sum > 0.0 && sum.is_finite() { (to_first - to_second) / sum } else { 0.0 }
+}
+
 /// Two parts and the border between them.
 struct Pair<'a> {
     mesh: &'a TriMesh,
@@ -125,29 +131,24 @@ struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    /// Whether a polygon has vertices on either side of the bisector. Of triangles as long as the patch the means lie near
-    /// one end or the other, and a border between those would run along all their diagonals.
-    fn reaches_across(&self, polygon: usize) -> bool {
+    /// Whether a polygon reaches over the bisector about as far to either side, by its vertices. Of triangles as long as the
+    /// patch the means lie near one end or the other, and a border between those would run along all their diagonals.
+    fn reaches_across(&self, polygon: usize, band: f64) -> bool {
         let [to_a, to_b] = self.parts.map(|part| part.row);
         let vertices = self.graph.faces.group(polygon).iter().flat_map(|&f| self.mesh.triangle(f));
-        let (mut first, mut second) = (false, false);
+        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
         for v in vertices {
-            first |= to_a[v.index()] < to_b[v.index()];
-            second |= to_a[v.index()] > to_b[v.index()];
+            let balance = balance(f64::from(to_a[v.index()]), f64::from(to_b[v.index()]));
+            (least, most) = (least.min(balance), most.max(balance));
         }
-        first && second
+        least < 0.0 && most > 0.0 && (least + most).abs() < 2.0 * band
     }
 
     fn improve(&self, settings: Cut, label: &mut [u32], progress: &Progress) -> Result<(), Cancelled> {
         let Cut { band, crease_share, cost, .. } = settings;
         let [a, b] = self.number.map(|n| u32::try_from(n).unwrap_or(0));
-        // −1 at the first representative, 0 on the bisector, 1 at the second.
-        let balance = |p: usize| {
-            let (to_a, to_b) = (self.parts[0].reach[p], self.parts[1].reach[p]);
-            let sum = to_a + to_b;
-            if sum > 0.0 && sum.is_finite() { (to_a - to_b) / sum } else { 0.0 }
-        };
-        let in_band = |p: usize| balance(p).abs() < band || self.reaches_across(p);
+        let mean_balance = |p: usize| balance(self.parts[0].reach[p], self.parts[1].reach[p]);
+        let in_band = |p: usize| mean_balance(p).abs() < band || self.reaches_across(p, band);
         let movable = |p: usize| (label[p] == a || label[p] == b) && in_band(p);
         let nodes: Vec<usize> = (0..self.graph.len()).filter(|&p| movable(p)).collect();
         let beyond = |p: usize| if label[p] == a { b } else { a };
