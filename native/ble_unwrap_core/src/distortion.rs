@@ -27,11 +27,18 @@ impl RestTriangle {
     /// protecting (a thousandth of a texel row a texel), and at this height Newton's Hessian still
     /// has a condition number near 1e6.
     pub const MIN_HEIGHT: f64 = 1e-3;
+    /// What the height of a needle is told by in double precision, with eight digits left.
+    const NEEDLE_HEIGHT: f64 = 1e-8;
 
     /// Lays a triangle in the plane. `unit` is a length typical of the mesh: a triangle whose longest
     /// edge is below `unit`·1e-6 becomes an equilateral one of that size.
     #[must_use]
     pub fn new(p: [Point3<f64>; 3], unit: f64) -> Self {
+        Self::at_least_as_high(p, unit, Self::MIN_HEIGHT)
+    }
+
+    /// The same with another least height over the longest edge.
+    fn at_least_as_high(p: [Point3<f64>; 3], unit: f64, least_height: f64) -> Self {
         let length = [(p[1] - p[0]).norm(), (p[2] - p[1]).norm(), (p[0] - p[2]).norm()];
         let longest = length[0].max(length[1]).max(length[2]);
         let least = unit * 1e-6;
@@ -44,7 +51,7 @@ impl RestTriangle {
         let (a, b, c) = (p[k], p[(k + 1) % 3], p[(k + 2) % 3]);
         let axis = (b - a) / longest;
         let along = (c - a).dot(&axis).clamp(0.0, longest);
-        let height = (c - a).cross(&axis).norm().max(Self::MIN_HEIGHT * longest);
+        let height = (c - a).cross(&axis).norm().max(least_height * longest);
         let laid = [Point2::new(0.0, 0.0), Point2::new(longest, 0.0), Point2::new(along, height)];
         let q = [laid[(3 - k) % 3], laid[(4 - k) % 3], laid[(5 - k) % 3]];
         let (e1, e2) = (q[1] - q[0], q[2] - q[0]);
@@ -55,9 +62,19 @@ impl RestTriangle {
     /// Rest triangles of all faces of a mesh; the unit is its mean edge length. O(n).
     #[must_use]
     pub fn of_mesh(mesh: &TriMesh) -> Vec<Self> {
+        Self::all(mesh, Self::MIN_HEIGHT)
+    }
+
+    /// Rest triangles of all faces of a mesh that may be as thin as a needle is: for a map that needs no derivative. O(n).
+    #[must_use]
+    pub fn needles_of_mesh(mesh: &TriMesh) -> Vec<Self> {
+        Self::all(mesh, Self::NEEDLE_HEIGHT)
+    }
+
+    fn all(mesh: &TriMesh, least_height: f64) -> Vec<Self> {
         let total: f64 = mesh.halfedges().map(|h| mesh.edge_length(h)).sum();
         let unit = total / mesh.halfedge_count().max(1) as f64;
-        mesh.faces().map(|f| Self::new(mesh.triangle_positions(f), unit)).collect()
+        mesh.faces().map(|f| Self::at_least_as_high(mesh.triangle_positions(f), unit, least_height)).collect()
     }
 
     /// Area.

@@ -71,6 +71,8 @@ impl Stage {
 #[derive(Debug)]
 pub struct Progress {
     cancelled: AtomicBool,
+    /// Whether the computation has seen that it is to stop.
+    stopping: AtomicBool,
     /// Refused allocations in this process when it began: one more ends it.
     refusals: AtomicU64,
     stage: AtomicU8,
@@ -82,6 +84,7 @@ impl Default for Progress {
     fn default() -> Self {
         Self {
             cancelled: AtomicBool::new(false),
+            stopping: AtomicBool::new(false),
             refusals: AtomicU64::new(memory::refusals()),
             stage: AtomicU8::new(Stage::Waiting as u8),
             fraction: AtomicU64::new(0.0f64.to_bits()),
@@ -119,9 +122,17 @@ impl Progress {
     /// [`note_refusal`](memory::note_refusal).
     pub fn check(&self) -> Result<(), Cancelled> {
         if self.is_cancelled() {
+            self.stopping.store(true, Ordering::Relaxed);
             return Err(Cancelled::OnRequest);
         }
         memory::none_since(self.refusals.load(Ordering::Relaxed)).map_err(Cancelled::OutOfMemory)
+    }
+
+    /// Whether a check has failed because of [`Progress::cancel`]: the computation can end in nothing but [`Cancelled`] now,
+    /// and does so once it has freed what it held, which takes a while where that is millions of small arrays.
+    #[must_use]
+    pub fn is_stopping(&self) -> bool {
+        self.stopping.load(Ordering::Relaxed)
     }
 
     /// The current stage.
@@ -179,6 +190,8 @@ mod tests {
         let p = Progress::new();
         assert_eq!(p.check(), Ok(()));
         p.cancel();
+        assert!(!p.is_stopping(), "nobody has looked yet");
         assert_eq!(p.check(), Err(Cancelled::OnRequest));
+        assert!(p.is_stopping());
     }
 }

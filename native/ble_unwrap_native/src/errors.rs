@@ -86,6 +86,11 @@ enum Kind {
 }
 
 impl Failure {
+    /// The computation saw that it was to stop.
+    pub(crate) fn cancelled() -> Self {
+        ble_unwrap_core::Cancelled::OnRequest.into()
+    }
+
     /// The core panicked.
     pub(crate) fn panic(text: &str) -> Self {
         Self { kind: Kind::Internal, text: format!("unexpected panic: {text}") }

@@ -56,30 +56,33 @@ enum State {
     Failed(Failure),
 }
 
-impl State {
-    fn is_pending(&self) -> bool {
-        matches!(self, Self::Running | Self::Delivering)
-    }
-}
-
 impl Shared {
     /// No code panics while it holds the lock, and if it did the state would still be whole.
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Whether the worker runs and may still bring a result. Once it is stopping it only frees its memory: that there is
+    /// none is told at once.
+    fn is_running(&self, state: &State) -> bool {
+        matches!(state, State::Running) && !self.progress.is_stopping()
+    }
+
     fn is_finished(&self) -> bool {
-        !matches!(*self.lock(), State::Idle | State::Running)
+        let state = self.lock();
+        !matches!(*state, State::Idle) && !self.is_running(&state)
     }
 
     /// Whether the result is still to come: by the worker or by a thread that makes the object.
     fn is_pending(&self) -> bool {
-        self.lock().is_pending()
+        let state = self.lock();
+        matches!(*state, State::Delivering) || self.is_running(&state)
     }
 
     /// Waits while the result is pending, for `limit` at most. Never call it with the interpreter held.
     fn wait(&self, limit: Duration) {
-        drop(self.finished.wait_timeout_while(self.lock(), limit, |state| state.is_pending()));
+        let pending = |state: &mut State| matches!(state, State::Delivering) || self.is_running(state);
+        drop(self.finished.wait_timeout_while(self.lock(), limit, pending));
     }
 }
 
@@ -121,6 +124,8 @@ impl Job {
                 })
             }));
             let outcome = outcome.unwrap_or_else(|panic| Err(Failure::panic(&panic_text(&*panic))));
+            // Which may have been told already.
+            let outcome = if shared.progress.is_stopping() { Err(Failure::cancelled()) } else { outcome };
             if outcome.is_ok() {
                 shared.progress.enter(Stage::Done);
             }
@@ -160,6 +165,7 @@ impl Job {
             State::Failed(failure) => return Err(failure.to_py_err()),
             State::Delivered(object) => return Ok(object.clone_ref(py)),
             State::Idle => return Err(InvalidArgumentError::new_err("the job was never given to a call")),
+            State::Running if self.shared.progress.is_stopping() => return Err(Failure::cancelled().to_py_err()),
             State::Running | State::Delivering | State::Ready(_) => {}
         }
         // While the object is made the interpreter may switch threads: others must find the lock
@@ -252,7 +258,7 @@ impl Job {
             .and_then(|limit| Instant::now().checked_add(limit));
         loop {
             let left = deadline.map_or(SIGNAL_INTERVAL, |d| d.saturating_duration_since(Instant::now()));
-            if left.is_zero() || !matches!(*self.shared.lock(), State::Running) {
+            if left.is_zero() || !self.shared.is_running(&self.shared.lock()) {
                 return Ok(self.shared.is_finished());
             }
             py.detach(|| self.shared.wait(left.min(SIGNAL_INTERVAL)));
@@ -280,6 +286,7 @@ impl Job {
     fn __repr__(&self) -> String {
         let state = match *self.shared.lock() {
             State::Idle => "not started",
+            State::Running if self.shared.progress.is_stopping() => "failed",
             State::Running => "running",
             State::Ready(_) | State::Delivering | State::Delivered(_) => "finished",
             State::Failed(_) => "failed",

@@ -39,10 +39,12 @@ pub enum Rung {
     Recut,
     /// Quads that came out bent were made convex.
     Unbend,
+    /// Triangles stretched far more than the others of a chart were relaxed.
+    Relax,
 }
 
 impl Rung {
-    const ALL: [Self; 18] = [
+    const ALL: [Self; 19] = [
         Self::Plane,
         Self::Unfold,
         Self::Projection,
@@ -61,6 +63,7 @@ impl Rung {
         Self::Merge,
         Self::Recut,
         Self::Unbend,
+        Self::Relax,
     ];
 
     /// A short name for reports.
@@ -85,6 +88,7 @@ impl Rung {
             Self::Merge => "merge",
             Self::Recut => "recut",
             Self::Unbend => "unbend",
+            Self::Relax => "relax",
         }
     }
 }

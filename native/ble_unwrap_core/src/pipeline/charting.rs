@@ -26,6 +26,8 @@ use crate::flattening::{Rung, Rungs};
 const LEAST_PLANARITY: f64 = 0.6;
 /// Spectral splits that deep have not helped; halving by breadth-first order always ends.
 const MOST_SPECTRAL_SPLITS: u32 = 24;
+/// A patch that is split comes apart at its hard edges where parts that unroll have at least this share of its area.
+const MOSTLY_UNROLLED: f64 = 0.9;
 /// Below this many faces a patch is not worth a cut for its handles: it is split.
 const LEAST_FACES_TO_CUT: usize = 8;
 
@@ -159,6 +161,16 @@ fn step(piece: &Piece, settings: &Settings, progress: &Run<'_>) -> Result<(Step,
     Ok((Step::Split(parts.into_iter().zip(inherited).collect()), rungs))
 }
 
+/// The parts of a patch between its hard edges, if those that unroll have at least a share of its area, and not in the paper's
+/// presets.
+pub(super) fn hard_parts(patch: &Patch, least_share: f64, settings: &Settings) -> Option<Vec<Patch>> {
+    if !settings.wants_darts() {
+        return None;
+    }
+    let parts = segmentation::between_hard_edges(&patch.mesh, &patch.polygon, least_share)?;
+    Some(patch.split(&parts.label, parts.parts))
+}
+
 /// The parts of a patch that is known not to be one chart, and that is not one polygon.
 pub(super) fn split(
     patch: &Patch,
@@ -213,6 +225,10 @@ impl<'a> Attempt<'a> {
     /// Parts by spectral segmentation, or halves after that has been tried so often; `splits` is 0 for a component.
     fn split(&self, splits: u32, rungs: &mut Rungs) -> Result<Vec<Patch>, Cancelled> {
         let (patch, progress) = (self.patch, self.progress);
+        if let Some(parts) = hard_parts(patch, MOSTLY_UNROLLED, self.settings) {
+            rungs.take(Rung::Split);
+            return Ok(parts);
+        }
         let parts = if splits < MOST_SPECTRAL_SPLITS {
             rungs.take(Rung::Split);
             let (distances, analysis) = self.analysis()?;

@@ -50,6 +50,8 @@ const FINE_UNION: usize = 20_000;
 const LEAST_COARSE_FACES: usize = 60;
 /// more than this on the fine mesh: below, charting it there costs no more.
 const LEAST_FINE_FACES: usize = 1_500;
+/// Share of the area that unrolls of a component that is charted as it is, however large. A little is left to rounding.
+const ALL: f64 = 1.0 - 1e-6;
 /// Share of the work on a component that the coarse mesh takes.
 const COARSE_WORK: f64 = 0.4;
 
@@ -65,7 +67,10 @@ pub(super) fn charts(
     let fine = Whole { patch: whole };
     let size = faces.len() as f64;
     let mut rungs = Rungs::default();
-    let mut charts = if whole.mesh.vertex_count() > COARSE_ABOVE && settings.coarse {
+    let is_large = whole.mesh.vertex_count() > COARSE_ABOVE && settings.coarse;
+    // What unrolls needs no trials that a coarse mesh would make cheap, and has its edges on the fine one.
+    let unrolling = is_large.then(|| charting::hard_parts(whole, ALL, settings)).flatten();
+    let mut charts = if is_large && unrolling.is_none() {
         let coarse = OnCoarse::new(fine, settings, progress)?;
         let parts = coarse.parts(&mut rungs, progress)?;
         tally.add(size, COARSE_WORK);
@@ -73,7 +78,8 @@ pub(super) fn charts(
         let charting = coarse.polish(parts, &done, &mut rungs, progress)?;
         fine.merge(charting, Which::AfterSplits { most_faces: FINE_UNION }, settings, &mut rungs, progress)?
     } else {
-        let charts = fine.charts(settings, &mut rungs, &|faces| tally.add(faces, 1.0), progress)?;
+        let patches = unrolling.unwrap_or_else(|| vec![whole.clone()]);
+        let charts = fine.charts(patches, settings, &mut rungs, &|faces| tally.add(faces, 1.0), progress)?;
         fine.sew(charts, settings, &mut rungs, progress)?.into_iter().map(|sewn| sewn.chart).collect()
     };
     charts = recut(&whole.mesh, &whole.polygon, charts, settings, &mut rungs, progress)?;
@@ -99,15 +105,16 @@ impl Whole<'_> {
         Patch::cut_out(&self.patch.mesh, &self.patch.polygon, faces.to_vec(), is_cut)
     }
 
-    /// Charts this mesh and joins charts that need not be apart.
+    /// Charts patches that make up this mesh and joins charts that need not be apart.
     fn charts(
         &self,
+        patches: Vec<Patch>,
         settings: &Settings,
         rungs: &mut Rungs,
         done: &(dyn Fn(f64) + Sync),
         progress: &Run<'_>,
     ) -> Result<Vec<Chart>, Cancelled> {
-        let charting = charting::chart(vec![self.patch.clone()], settings, done, progress)?;
+        let charting = charting::chart(patches, settings, done, progress)?;
         rungs.add(&charting.rungs);
         self.merge(charting, Which::All, settings, rungs, progress)
     }
@@ -209,7 +216,7 @@ impl<'a> OnCoarse<'a> {
     /// Parts that flatten under the limit on the coarse mesh.
     fn parts(&self, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Vec<Part>, Cancelled> {
         let whole = Whole { patch: &self.whole };
-        let charts = whole.charts(&self.strict, rungs, &|_| (), progress)?;
+        let charts = whole.charts(vec![self.whole.clone()], &self.strict, rungs, &|_| (), progress)?;
         let parts = self.prolong_labels(self.fine.patch, &charts, progress)?;
         let sewn = whole.sew(charts, &self.strict, rungs, progress)?;
         Ok(self.join(parts, sewn))

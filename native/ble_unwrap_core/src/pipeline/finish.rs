@@ -20,7 +20,7 @@ use crate::settings::{ChartScale, LimitOver, Settings};
 use crate::verify::{self, Certificate};
 
 use super::memo::Run;
-use super::{charting, flatten, polygon, unbend};
+use super::{charting, flatten, polygon, touch_up};
 use crate::flattening::{Rung, Rungs};
 
 /// Rounds of packing, checking and mending. Needles that rounding breaks are gone after one; the rest
@@ -56,8 +56,8 @@ pub(super) fn finish(
     let mut packing = settings.packing.clone();
     let mut round = 0;
     loop {
-        charts = unbend::unbend(charts, settings, &mut rungs, progress)?;
-        clock.lap("unbend");
+        charts = touch_up::touch_up(charts, settings, &mut rungs, progress)?;
+        clock.lap("touch up");
         progress.enter(Stage::Pack);
         scale(&mut charts, settings);
         let layout = Layout::new(input, surface, &charts, &packing, progress)?;
@@ -135,7 +135,7 @@ fn report_of(
     }
     report.bent_quads = metrics::bent_quads(input, &layout.uv, |face| layout.polygon_chart[face] >= 0).len();
     if report.bent_quads > 0 {
-        report.warnings.push(unbend::warning(report.bent_quads));
+        report.warnings.push(touch_up::warning(report.bent_quads));
     }
     if let Some(&(chart, l2)) = report.charts_over_limit.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
         report.warnings.push(format!(
@@ -250,7 +250,7 @@ impl Layout {
                 Point2::new(texel.x / size[0], texel.y / size[1])
             };
             let exact: Vec<Point2<f64>> = chart.uv.iter().map(place).collect();
-            let halves = unbend::convex_halves(chart);
+            let halves = touch_up::convex_halves(chart);
             let uv = match rounding::round_to_f32(&chart.patch.mesh, &halves, &exact, &rounding, progress) {
                 Ok(rounded) => rounded.uv,
                 Err(RoundingError::Cancelled(cancelled)) => return Err(cancelled.into()),

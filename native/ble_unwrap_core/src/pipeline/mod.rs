@@ -24,7 +24,7 @@ mod ribbons;
 mod rigid;
 mod sew;
 mod tally;
-mod unbend;
+mod touch_up;
 
 use crate::atlas::Atlas;
 use crate::clock::Clock;

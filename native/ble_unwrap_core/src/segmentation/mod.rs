@@ -20,6 +20,7 @@ mod between;
 mod boundary;
 mod grow;
 mod guides;
+mod hard_edges;
 mod min_cut;
 mod polygon_graph;
 mod repair;
@@ -32,6 +33,7 @@ use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
 
 pub use between::between;
+pub(crate) use hard_edges::between_hard_edges;
 pub use min_cut::CutGraph;
 use polygon_graph::PolygonGraph;
 pub use spectral::SpectralAnalysis;

@@ -5,21 +5,22 @@
 use nalgebra::{Matrix2, Point2, Vector2};
 
 use super::grid::Grid;
-use super::system::{ChartSystem, advance};
+use super::moving_boundary::MovingBoundary;
+use super::system::ChartSystem;
 use crate::distortion::RestTriangle;
 use crate::mesh::{HalfedgeId, TriMesh};
 
 /// The barrier usually begins at this share of the boundary edges' lengths: small enough that the boundary of
 /// an undistorted chart does not feel itself round an ordinary corner.
 pub const BOUNDARY_REACH: f64 = 0.25;
-/// Cells a moving boundary may touch in the search for contacts, for each edge; a longer step is
-/// halved first.
-const SWEEP_BUDGET: usize = 64;
 /// Halvings after which a step is given up: 2⁻³⁰ of it moves nothing.
 const MAX_HALVINGS: usize = 30;
 /// A contact counts if it is this near the edge, relative to its length: rounding must not let a
 /// vertex slip past the end of an edge.
 const CONTACT_SLACK: f64 = 1e-6;
+/// What boxes round edges are widened by for that to be found, relative to their two sides together, which no edge in them
+/// is longer than.
+const ROOM: f64 = 2.0 * CONTACT_SLACK;
 
 /// Σ w·max(0, δ/d − 1)² over boundary vertices and boundary edges they are no end of, d their distance.
 ///
@@ -28,6 +29,8 @@ const CONTACT_SLACK: f64 = 1e-6;
 pub(super) struct Barrier {
     /// The boundary edges; vertex number `i` of the boundary is the start of edge `i`.
     edges: Vec<HalfedgeId>,
+    /// The numbers of the edges in the order in which the boundary runs.
+    order: Vec<u32>,
     from: Vec<u32>,
     to: Vec<u32>,
     vertex_reach: Vec<f64>,
@@ -54,27 +57,6 @@ struct Contact {
     normal: Vector2<f64>,
 }
 
-/// A box around what moves, with room for what counts as a contact beyond its ends.
-struct Swept {
-    low: Point2<f64>,
-    high: Point2<f64>,
-}
-
-impl Swept {
-    fn new(hull: &[Point2<f64>]) -> Self {
-        let low = hull.iter().skip(1).fold(hull[0], |low, p| low.inf(p));
-        let high = hull.iter().skip(1).fold(hull[0], |high, p| high.sup(p));
-        // No edge is longer than the box's two sides together at any time on its way.
-        let room = Vector2::repeat(2.0 * CONTACT_SLACK * ((high - low).sum() + f64::MIN_POSITIVE));
-        Self { low: low - room, high: high + room }
-    }
-
-    #[inline]
-    fn meets(&self, other: &Self) -> bool {
-        (0..2).all(|k| self.low[k] <= other.high[k] && other.low[k] <= self.high[k])
-    }
-}
-
 impl Barrier {
     pub(super) fn new(mesh: &TriMesh, rest: &[RestTriangle], reach: f64) -> Self {
         let edges: Vec<HalfedgeId> = mesh.halfedges().filter(|&h| mesh.is_boundary(h)).collect();
@@ -89,7 +71,9 @@ impl Barrier {
             }
         }
         let edge_reach: Vec<f64> = edges.iter().map(|&h| reach * length(h)).collect();
+        let number = |h: &HalfedgeId| edges.binary_search(h).ok().map(|i| i as u32);
         Self {
+            order: mesh.boundary_loops().iter().flatten().filter_map(number).collect(),
             from: edges.iter().map(|&h| mesh.from(h).index() as u32).collect(),
             to: edges.iter().map(|&h| mesh.to(h).index() as u32).collect(),
             vertex_reach: edges.iter().map(|&h| vertex_reach[mesh.from(h).index()]).collect(),
@@ -107,11 +91,8 @@ impl Barrier {
     /// Calls `visit` for every vertex and edge within their reach, in a fixed order; `false` if `uv` is
     /// not finite.
     fn for_contacts(&self, uv: &[Point2<f64>], mut visit: impl FnMut(&Contact)) -> bool {
-        let hull = |i: usize| {
-            let (a, b) = (uv[self.from[i] as usize], uv[self.to[i] as usize]);
-            [a, b, a, b]
-        };
-        let Some(grid) = Grid::new(self.edges.len(), hull, |i| self.edge_reach[i], usize::MAX) else {
+        let hull = |i: usize| [uv[self.from[i] as usize], uv[self.to[i] as usize]];
+        let Some(grid) = Grid::new(self.edges.len(), hull, |i| self.edge_reach[i]) else {
             return false;
         };
         let mut near = Vec::new();
@@ -175,34 +156,32 @@ impl Barrier {
     }
 
     /// The greatest step up to `most` along `direction` before which no boundary vertex touches a
-    /// boundary edge, up to rounding; may be less than that if the boundary moves far.
+    /// boundary edge, up to rounding; may be less than that if the boundary is thrown about. O(b log b) where neighbours move
+    /// alike.
     pub(super) fn first_contact(&self, uv: &[Point2<f64>], direction: &[f64], most: f64) -> f64 {
+        let moving = |v: u32| (uv[v as usize], Vector2::new(direction[2 * v as usize], direction[2 * v as usize + 1]));
+        let ends = |edge: usize| [moving(self.from[edge]), moving(self.to[edge])];
+        let Some(boundary) = MovingBoundary::new(&self.order, ends, most) else { return 0.0 };
         let mut most = most;
-        let mut moved = uv.to_vec();
         for _ in 0..MAX_HALVINGS {
-            advance(uv, direction, most, &mut moved);
-            let hull = |i: usize| {
-                let (a, b) = (self.from[i] as usize, self.to[i] as usize);
-                [uv[a], uv[b], moved[a], moved[b]]
-            };
-            let Some(grid) = Grid::new(self.edges.len(), hull, |_| 0.0, SWEEP_BUDGET * self.edges.len()) else {
-                most *= 0.5;
-                continue;
-            };
-            // Near a long edge or a long way there are many more pairs than ever come close to meeting.
-            let swept: Vec<Swept> = (0..self.edges.len()).map(|i| Swept::new(&hull(i))).collect();
-            let mut least = most;
+            let (mut least, mut visits) = (most, 0);
             for vertex in 0..self.edges.len() {
-                let v = self.from[vertex] as usize;
-                let way = Swept::new(&[uv[v], moved[v]]);
-                grid.near(&[uv[v], moved[v]], |edge| {
-                    let edge = edge as usize;
-                    if way.meets(&swept[edge]) && !self.is_end(vertex, edge) {
-                        least = self.contact_time(uv, direction, vertex, edge, least);
+                let own = moving(self.from[vertex]);
+                least = boundary.near(own, least, ROOM, &mut visits, |edge, least| {
+                    if self.is_end(vertex, edge) {
+                        least
+                    } else {
+                        self.contact_time(uv, direction, vertex, edge, least)
                     }
                 });
+                if visits > boundary.most_visits() {
+                    break;
+                }
             }
-            return least;
+            if visits <= boundary.most_visits() {
+                return least;
+            }
+            most *= 0.5;
         }
         0.0
     }

@@ -73,6 +73,51 @@ impl IsotropicEnergy for StretchEnergy {
     }
 }
 
+/// The stretch energy, and a power of the squared stretch e beside it that is worth nothing but where e is near its peak m:
+/// h + W·m/p·(e/m)ᵖ. At the peak it pulls W times as hard on e as the plain stretch does twice, at half of it an eighth of that.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PeakEnergy {
+    plain: StretchEnergy,
+    peak: f64,
+}
+
+impl PeakEnergy {
+    /// W.
+    const WEIGHT: f64 = 4.0;
+    /// p.
+    const POWER: i32 = 4;
+
+    /// For a map whose greatest squared stretch is `peak`, with weight `w` of the symmetric Dirichlet part.
+    pub(super) fn new(w: f64, peak: f64) -> Self {
+        Self { plain: StretchEnergy::new(w), peak }
+    }
+}
+
+impl IsotropicEnergy for PeakEnergy {
+    fn value(&self, i: f64, d: f64) -> f64 {
+        let share = 0.5 * i / (d * d) / self.peak;
+        self.plain.value(i, d) + Self::WEIGHT * self.peak / f64::from(Self::POWER) * share.powi(Self::POWER)
+    }
+
+    fn derivatives(&self, i: f64, d: f64) -> Derivatives {
+        let r = 1.0 / d;
+        let r2 = r * r;
+        // e in I and d, then the power in e.
+        let (e_i, e_d, e_id, e_dd) = (0.5 * r2, -i * r2 * r, -r2 * r, 3.0 * i * r2 * r2);
+        let share = 0.5 * i * r2 / self.peak;
+        let slope = Self::WEIGHT * share.powi(Self::POWER - 1);
+        let curve = Self::WEIGHT * f64::from(Self::POWER - 1) * share.powi(Self::POWER - 2) / self.peak;
+        let plain = self.plain.derivatives(i, d);
+        Derivatives {
+            i: plain.i + slope * e_i,
+            d: plain.d + slope * e_d,
+            ii: plain.ii + curve * e_i * e_i,
+            id: plain.id + curve * e_i * e_d + slope * e_id,
+            dd: plain.dd + curve * e_d * e_d + slope * e_dd,
+        }
+    }
+}
+
 /// ½(I + d² + 1)/χ(d) with χ(d) = ½(d + √(d² + ε²)): finite for every map, 2 at an isometry as ε → 0.
 ///
 /// As ε falls flipped triangles cost more and more, while the energy of positive ones tends to
@@ -302,6 +347,7 @@ mod tests {
             x in prop::array::uniform6(-2.0..2.0_f64),
             w in 0.0..1.0_f64,
             epsilon in 0.1..1.0_f64,
+            peak in 1.0..3.0_f64,
         ) {
             let rest = RestTriangle { x1: rest.0, x2: rest.1, y2: rest.2 };
             let mut x = V6::from(x);
@@ -314,6 +360,9 @@ mod tests {
                 }
             }
             check(&StretchEnergy::new(w), &rest, &x)?;
+            let j = jacobian(&HatGradients::new(&rest), &x);
+            let peak = peak * 0.5 * j.norm_squared() / d.powi(2);
+            check(&PeakEnergy::new(w, peak), &rest, &x)?;
         }
 
         #[test]

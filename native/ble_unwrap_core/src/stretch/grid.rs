@@ -8,8 +8,7 @@ const PADDING: f64 = 1e-6;
 /// Most cells along one side.
 const MAX_SIDE: f64 = 4096.0;
 
-/// The convex hull of a few points, as something to put in a grid: a segment, or the region that a
-/// segment sweeps between two times (its four ends).
+/// The convex hull of a few points: a point, or a segment to put in a grid.
 type Hull<'a> = &'a [Point2<f64>];
 
 /// For each cell, the items that reach into it. Items are put only in the cells they touch, row by
@@ -24,14 +23,13 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Puts `hull(i)`, i < `count`, widened by `reach(i)`, into about `count` cells. `None` if that takes
-    /// more than `budget` entries, or if a coordinate is not finite. Each item has a reach of its own: that of one long
+    /// Puts `hull(i)`, i < `count`, widened by `reach(i)`, into about `count` cells. `None` if a
+    /// coordinate is not finite. Each item has a reach of its own: that of one long
     /// edge, given to all the short ones, would fill the grid with each of them.
     pub(super) fn new(
         count: usize,
-        hull: impl Fn(usize) -> [Point2<f64>; 4],
+        hull: impl Fn(usize) -> [Point2<f64>; 2],
         reach: impl Fn(usize) -> f64,
-        budget: usize,
     ) -> Option<Self> {
         let (mut low, mut high) =
             (Point2::new(f64::INFINITY, f64::INFINITY), Point2::new(-f64::INFINITY, -f64::INFINITY));
@@ -66,9 +64,6 @@ impl Grid {
         let mut entries: Vec<(u32, u32)> = Vec::new();
         for i in 0..count {
             grid.for_cells(&hull(i), reach(i), |cell| entries.push((cell as u32, i as u32)));
-            if entries.len() > budget {
-                return None;
-            }
         }
         entries.sort_unstable();
         grid.start = vec![0; grid.columns * grid.rows + 1];
@@ -160,10 +155,10 @@ mod tests {
                 let [x, y, z, w] = ends[i];
                 [Point2::new(x, y), Point2::new(z, w)]
             };
-            let hull = |i: usize| { let [a, b] = segment(i); [a, b, a, b] };
+            let hull = segment;
             // Every other one with less.
             let reach = |i: usize| if i.is_multiple_of(2) { reach } else { 0.5 * reach };
-            let grid = Grid::new(ends.len(), hull, reach, usize::MAX).expect("within budget");
+            let grid = Grid::new(ends.len(), hull, reach).expect("finite");
             let p = Point2::new(at[0], at[1]);
             let mut found = vec![false; ends.len()];
             grid.near(&[p], |i| found[i as usize] = true);
@@ -178,9 +173,9 @@ mod tests {
         let at = |t: f64| Point2::new(t, t);
         let hull = |i: usize| {
             let t = i as f64 / 10_000.0;
-            if i == 0 { [at(0.0), at(1.0), at(0.0), at(1.0)] } else { [Point2::new(t, 1.0 - t); 4] }
+            if i == 0 { [at(0.0), at(1.0)] } else { [Point2::new(t, 1.0 - t); 2] }
         };
-        let grid = Grid::new(10_000, hull, |_| 0.0, usize::MAX).expect("within budget");
+        let grid = Grid::new(10_000, hull, |_| 0.0).expect("finite");
         assert!(grid.items.len() < 10_000 * 2 + 500, "{}", grid.items.len());
     }
 
@@ -193,20 +188,19 @@ mod tests {
                 Point2::new(angle.cos(), angle.sin())
             };
             let hull = |i: usize| {
-                if i < n { [at(i), at(i + 1), at(i), at(i + 1)] } else { [Point2::origin(), at(i), at(i), at(i)] }
+                if i < n { [at(i), at(i + 1)] } else { [Point2::origin(), at(i)] }
             };
             let reach = |i: usize| if i < n { 0.25 / n as f64 } else { 0.25 };
-            Grid::new(n + 2, hull, reach, usize::MAX).expect("within budget").items.len()
+            Grid::new(n + 2, hull, reach).expect("finite").items.len()
         };
         let (few, many) = (entries(1000), entries(4000));
         assert!(many < 5 * few, "{few} entries become {many} for four times as many edges");
     }
 
     #[test]
-    fn refuses_bad_coordinates_and_keeps_to_its_budget() {
-        assert!(Grid::new(1, |_| [Point2::new(f64::NAN, 0.0); 4], |_| 0.0, 100).is_none());
-        assert!(Grid::new(50, |i| [Point2::new(i as f64, 0.0); 4], |_| 60.0, 100).is_none());
-        assert!(Grid::new(0, |_| [Point2::origin(); 4], |_| 0.0, 0).is_some());
-        assert!(Grid::new(3, |_| [Point2::new(2.0, 2.0); 4], |_| 0.0, 100).is_some());
+    fn refuses_bad_coordinates_and_takes_none() {
+        assert!(Grid::new(1, |_| [Point2::new(f64::NAN, 0.0); 2], |_| 0.0).is_none());
+        assert!(Grid::new(0, |_| [Point2::origin(); 2], |_| 0.0).is_some());
+        assert!(Grid::new(3, |_| [Point2::new(2.0, 2.0); 2], |_| 0.0).is_some());
     }
 }

@@ -26,11 +26,13 @@ mod injective;
 mod laplacian;
 mod line_search;
 mod measure;
+mod moving_boundary;
 mod neighbourhood;
 mod newton;
 mod other_halves;
 mod overlap;
 mod part_boundary;
+mod peaks;
 mod stitch;
 mod system;
 #[cfg(test)]
@@ -50,6 +52,7 @@ pub use measure::{
 };
 pub use overlap::{BoundaryDefect, boundary_defect, boundary_is_simple, first_flip};
 pub use part_boundary::{boundary_is_tangled, part_boundary};
+pub use peaks::lower_peaks;
 pub use stitch::stitch;
 pub use tutte::{TutteBoundary, tutte_embedding};
 pub use unbend::{Unbent, unbend};

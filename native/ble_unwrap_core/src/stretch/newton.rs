@@ -3,7 +3,7 @@
 use nalgebra::Point2;
 
 use super::barrier::Barrier;
-use super::energy::StretchEnergy;
+use super::energy::{IsotropicEnergy, PeakEnergy, StretchEnergy};
 use super::measure::{plane_area, surface_area};
 use super::neighbourhood::Neighbourhood;
 use super::other_halves::OtherHalves;
@@ -192,6 +192,29 @@ pub(super) fn relax_with_halves(
     Ok(descent.uv)
 }
 
+/// Lowers what is near the peak of the squared stretch, from a map without flips, by a few steps; no triangle collapses, the other
+/// halves of quads among them. Pinned vertices stay.
+pub(super) fn relax_peak(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    halves: &OtherHalves,
+    pinned: &[bool],
+    start: Vec<Point2<f64>>,
+    peak: f64,
+    progress: &Progress,
+) -> Result<Vec<Point2<f64>>, StretchError> {
+    let energy = PeakEnergy::new(StretchSettings::default().dirichlet_weight, peak);
+    let mut descent = Descent::new(mesh, rest, halves, start, pinned.to_vec(), None)?;
+    for _ in 0..WORST_STEPS {
+        progress.check()?;
+        let Some((before, after)) = descent.step(mesh, &energy) else { break };
+        if before - after <= WORST_TOLERANCE * after {
+            break;
+        }
+    }
+    Ok(descent.uv)
+}
+
 /// Everything one Newton step works on.
 struct Descent<'a> {
     system: ChartSystem<'a>,
@@ -218,7 +241,7 @@ impl<'a> Descent<'a> {
         Ok(Self { system: ChartSystem::new(mesh, rest, halves)?, barrier, pinned, direction, uv, trial })
     }
 
-    fn value(&self, energy: &StretchEnergy, uv: &[Point2<f64>]) -> f64 {
+    fn value<E: IsotropicEnergy>(&self, energy: &E, uv: &[Point2<f64>]) -> f64 {
         let own = self.system.faces.value(energy, uv);
         match &self.barrier {
             Some(barrier) if own.is_finite() => own + barrier.value(uv),
@@ -227,7 +250,7 @@ impl<'a> Descent<'a> {
     }
 
     /// One Newton step; the energy before and after, or `None` if there is no step downhill.
-    fn step(&mut self, mesh: &TriMesh, energy: &StretchEnergy) -> Option<(f64, f64)> {
+    fn step<E: IsotropicEnergy>(&mut self, mesh: &TriMesh, energy: &E) -> Option<(f64, f64)> {
         let before = self.value(energy, &self.uv);
         self.system.assemble(energy, &self.uv);
         if let Some(barrier) = &self.barrier {

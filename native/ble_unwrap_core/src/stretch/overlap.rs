@@ -87,11 +87,8 @@ pub(super) fn boundary_crossings(mesh: &TriMesh, uv: &[Point2<f64>]) -> Vec<Half
 fn visit_crossings(mesh: &TriMesh, uv: &[Point2<f64>], mut visit: impl FnMut(HalfedgeId, HalfedgeId) -> bool) -> bool {
     let edges: Vec<HalfedgeId> = mesh.halfedges().filter(|&h| mesh.is_boundary(h)).collect();
     let ends = |h: HalfedgeId| [uv[mesh.from(h).index()], uv[mesh.to(h).index()]];
-    let hull = |i: usize| {
-        let [a, b] = ends(edges[i]);
-        [a, b, a, b]
-    };
-    let Some(grid) = Grid::new(edges.len(), hull, |_| 0.0, usize::MAX) else { return false };
+    let hull = |i: usize| ends(edges[i]);
+    let Some(grid) = Grid::new(edges.len(), hull, |_| 0.0) else { return false };
     for cell in grid.cells() {
         for (k, &i) in cell.iter().enumerate() {
             for &j in &cell[..k] {
