@@ -3,7 +3,7 @@
 import bpy
 from bpy.props import BoolProperty
 
-from .. import engine, faces, last_result, mesh_bridge, preferences, properties, targets
+from .. import engine, faces, kept_analysis, last_result, mesh_bridge, preferences, properties, targets
 from ..panel import panel_settings
 from ..run import Run
 
@@ -203,7 +203,7 @@ def redraw(context):
 @bpy.app.handlers.persistent
 def forget(*_):
     """Frees the analysis kept for the redo panel: another file is loaded."""
-    engine.forget()
+    kept_analysis.forget()
 
 
 def register():
@@ -213,5 +213,5 @@ def register():
 
 def unregister():
     bpy.app.handlers.load_post.remove(forget)
-    engine.forget()
+    kept_analysis.forget()
     bpy.utils.unregister_class(UV_OT_ble_unwrap)
