@@ -43,14 +43,14 @@ quality: $(VENV)/.wheel
 
 contact-sheet: zip
 	.ci/blender_libraries
-	$(PYTHON) .ci/contact_sheet $(MODELS) $(if $(COMPARE),--compare $(COMPARE))
+	$(BIN)/python .ci/contact_sheet $(MODELS) $(if $(COMPARE),--compare $(COMPARE))
 
 test-python: $(VENV)/.wheel
 	$(BIN)/python -m pytest tests --ignore=tests/blender
 
 test-blender: zip
 	.ci/blender_libraries
-	$(PYTHON) .ci/test_blender
+	$(BIN)/python .ci/test_blender
 
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .
@@ -70,7 +70,7 @@ zip: wheel
 
 demo: zip
 	.ci/blender_libraries
-	$(PYTHON) .ci/demo $(MESH)
+	$(BIN)/python .ci/demo $(MESH)
 
 paper: $(VENV)/.wheel $(VENV)/.paper
 	.ci/blender_libraries

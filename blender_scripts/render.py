@@ -127,21 +127,6 @@ def place_lights(scene, camera):
     return key, world
 
 
-def taken(path):
-    """The pixels of a picture file as (h, w, 3) uint8; the file is removed."""
-    import bpy
-    import numpy as np
-
-    image = bpy.data.images.load(str(path))
-    image.colorspace_settings.name = "Non-Color"  # the values as they are in the file
-    pixels = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
-    image.pixels.foreach_get(pixels)
-    pixels = pixels.reshape(image.size[1], image.size[0], image.channels)[::-1, :, :3]
-    bpy.data.images.remove(image)
-    Path(path).unlink()
-    return (pixels * 255 + 0.5).astype(np.uint8)
-
-
 def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=16, plain=False, view=None):
     """Renders objects through a UV map to a PNG file. Their materials and other objects' visibility are put back.
 
