@@ -7,6 +7,7 @@ import numpy as np
 
 def text(
     *,
+    code,
     machine,
     faces,
     landmarks,
@@ -23,7 +24,7 @@ def text(
     models,
 ):
     parts = [
-        _head(machine, models),
+        _head(code, machine, models),
         _figure_2a(faces, landmarks),
         _figure_2b(heads) if rendered else "",
         _figure_3(made, models) if rendered else "",
@@ -36,14 +37,16 @@ def text(
     return "\n\n".join(part.strip() for part in parts if part) + "\n"
 
 
-def _head(machine, models):
+def _head(code, machine, models):
     given = f" Models given by path: {', '.join(models)}." if models else ""
     return f"""# The paper's figures, measured again
 
 *Bernoulli Embedding Model and Its Application in Texture Mapping* (2006) shows two figures and compares itself with Isomap and
-iso-charts in words. `make paper` makes the figures and the comparison anew and writes this page (`make paper MODELS="a.obj b.obj"`
-does it for your own models, to `out/paper/`).{given} Measured on {machine}; seconds vary with the machine and what else it does (of embeddings of patches the best of several runs is given),
-everything else is the same on any machine.
+iso-charts in words. `make paper` makes the figures and the comparison anew in `out/paper/` (`make paper MODELS="a.obj b.obj"`
+for your own models); `make paper-page` also brings this page up to date.{given}
+
+Measured with {code} on {machine}. Seconds vary with the machine and what else it does (of embeddings of patches the best of several
+runs is given); everything else is the same on any machine.
 
 Three methods are compared, on the same surfaces and the same geodesic distances:
 
