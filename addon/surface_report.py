@@ -56,7 +56,7 @@ def _overlaps_text(measured):
     overlaps, kept = counted(measured.get("overlaps"), "overlap"), measured.get("overlaps_with_kept")
     if kept is None:
         return overlaps
-    return f"{overlaps}, {f'{kept:,}' if kept else 'none'} with faces that were kept"
+    return f"{overlaps}, {f'{kept:,}' if kept else 'none'} with faces that were not unwrapped"
 
 
 def lines(certificate, *, margin, stretch_limit, limit_over="CHART", notes=(), length_text="{:.4g}".format):

@@ -146,8 +146,8 @@ class UnwrapTask:
             measured = {**measured, "overlaps_with_kept": overlaps}
             if overlaps:
                 warnings.append(
-                    f"New charts lie on faces that were kept, {counted(overlaps, 'pair')} of triangles: select "
-                    "those faces, too, turn on Keep Place, or pack all charts afterwards (UV > Pack Islands)"
+                    f"New charts overlap faces that were not unwrapped ({counted(overlaps, 'pair')} of triangles): "
+                    "select those faces, too, turn on Keep Place, or pack all charts afterwards (UV > Pack Islands)"
                 )
         certificate = surface_report.certify(measured, margin=margin, warnings=warnings, **limit)
         seconds = self.timer.seconds()
@@ -185,10 +185,10 @@ class Bounds:
 def bounds_to_keep(uv, texture_size):
     """The rectangle that UVs (n, 2) fill, in whole pixels, and None; or None and why there is nothing to pack into."""
     if uv is None or not np.isfinite(uv).all():
-        return None, "There were no UVs whose place could be kept"
+        return None, "There were no old UVs whose place could be kept; the whole texture was used"
     low, high = uv.min(axis=0).astype(float), uv.max(axis=0).astype(float)
     if (high - low).min() < SMALLEST_BOUNDS:
-        return None, "The old UVs fill no rectangle; the whole square was used"
+        return None, "The old UVs lie on one line or point, so they have no place to keep; the whole texture was used"
     pixels = np.maximum(1, np.floor((high - low) * texture_size)).astype(int)
     return Bounds(low, pixels / texture_size, (int(pixels[0]), int(pixels[1]))), None
 

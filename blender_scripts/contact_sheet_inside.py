@@ -191,7 +191,7 @@ def main(argv):
         return batch.SOME_FAILED
     broken = {name: found["violations"] for name, found in report.items() if found["violations"]}
     for name, violations in broken.items():
-        print(f"{name}: certificate does not hold: {'; '.join(violations)}", file=sys.stderr)
+        print(f"{name}: not as promised: {'; '.join(violations)}", file=sys.stderr)
     return batch.VIOLATED if broken else batch.OK
 
 

@@ -170,7 +170,7 @@ def main(argv):
     broken |= {name: found["violations"] for name, found in clouds.items()}
     for name, violations in broken.items():
         for text in violations:
-            print(f"{name}: certificate does not hold: {text}", file=sys.stderr)
+            print(f"{name}: not as promised: {text}", file=sys.stderr)
     return batch.VIOLATED if any(broken.values()) else batch.OK
 
 

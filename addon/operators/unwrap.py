@@ -31,8 +31,8 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
     bl_idname = "uv.ble_unwrap"
     bl_label = "BLE Unwrap"
     bl_description = (
-        "Cut, flatten and pack meshes and point clouds so that no chart is stretched beyond a limit, "
-        "without overlaps or flips"
+        "Cut meshes into charts (UV islands), flatten and pack them, so that none is stretched beyond a limit, "
+        "overlaps or is flipped. Point clouds get UVs, too"
     )
     bl_options = {"REGISTER", "UNDO"}
 
@@ -168,7 +168,7 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
                 self.report({"INFO"}, f"BLE Unwrap:{name} {outcome.summary}")
             else:
                 broken = "; ".join(outcome.certificate.violations)
-                self.report({"WARNING"}, f"BLE Unwrap:{name} {outcome.summary}. Not kept: {broken}")
+                self.report({"WARNING"}, f"BLE Unwrap:{name} {outcome.summary}. Not as promised: {broken}")
         redraw(context)
         return {"FINISHED"}
 

@@ -205,13 +205,13 @@ def test_resume_skips_what_is_done(addon, files, tmp_path, capsys):
     batch = addon("batch")
     arguments = [str(source), "-o", str(tmp_path / "out"), "--report", str(tmp_path / "r.json"), "--resume"]
     assert batch.main(arguments) == 0
-    assert "done before" not in capsys.readouterr().out
+    assert "done already" not in capsys.readouterr().out
     written = (tmp_path / "out/a.obj").stat().st_mtime_ns
     assert batch.main(arguments) == 0
-    assert "done before" in capsys.readouterr().out
+    assert "done already" in capsys.readouterr().out
     assert (tmp_path / "out/a.obj").stat().st_mtime_ns == written
     assert batch.main([*arguments, "--seed", "4"]) == 0
-    assert "done before" not in capsys.readouterr().out
+    assert "done already" not in capsys.readouterr().out
 
 
 def test_several_objects_one_atlas_or_one_each(addon, files, tmp_path):
