@@ -95,7 +95,7 @@ def test_the_tables_say_what_was_measured(rows):
     assert table[2].startswith("| face (484 vertices) | BLE (default) | 0 | 1.0")
     groups = {"face": [row for row in rows if row.patch == "face"]}
     charts = compare.chart_table(groups).splitlines()
-    assert len(charts) == 5 and charts[2].startswith("| face (1 charts, 484 vertices) | BLE (default) | 0 | 1 of 1 |")
+    assert len(charts) == 5 and charts[2].startswith("| face (1 chart, 484 vertices) | BLE (default) | 0 | 1 of 1 |")
 
 
 def test_trimmed_stretch():

@@ -104,7 +104,7 @@ def atlases(models, renders):
     found = []
     for mesh in models:
         atlas = ble.unwrap(*mesh.arrays, texture_size=1024)
-        say(f"{mesh.name}: {atlas.report['faces']:,} faces, {atlas.report['charts']} charts")
+        say(f"{mesh.name}: {atlas.report['faces']:,} faces, {compare.charts_text(atlas.report['charts'])}")
         uv, chart = np.asarray(atlas.uv), np.asarray(atlas.chart)
         name = mesh.name.replace(" ", "_")
         pictures = {
@@ -123,7 +123,7 @@ def variants(models):
             begin = time.perf_counter()
             report = ble.unwrap(*mesh.arrays, preset=preset, texture_size=1024, margin=2).report
             rows.append((mesh.name, preset, dict(report), time.perf_counter() - begin))
-            say(f"{mesh.name}, preset {preset}: {report['charts']} charts in {rows[-1][-1]:.0f} s")
+            say(f"{mesh.name}, preset {preset}: {compare.charts_text(report['charts'])} in {rows[-1][-1]:.0f} s")
     return rows
 
 

@@ -94,7 +94,8 @@ their sweeps are used up."""
 def _figure_3(made, models):
     kinds = "the models given" if models else "a skull, a goblin and a cat, generated"
     found = "; ".join(
-        f"{mesh.name} {atlas.report['faces']:,} faces, {atlas.report['charts']} charts, L2 {atlas.report['l2']:.3f}"
+        f"{mesh.name} {atlas.report['faces']:,} faces, {compare.charts_text(atlas.report['charts'])},"
+        f" L2 {atlas.report['l2']:.3f}"
         for mesh, atlas, _ in made
     )
     return f"""## Figure 3: atlases of complex models
@@ -146,13 +147,13 @@ others on this machine; `make bench` times the same embedding on one core by its
 
 ## The three methods on the same charts
 
-The charts of an unwrap without coarse mesh and merging of the models of figure 3, each flattened as `unwrap` does it (by landmarks; the paper's preset with all vertices
-together up to 2,000). Flips and times are sums, the others means weighted by vertices.
+The models of figure 3 are unwrapped once more, without coarse mesh and without merging, and each of the charts is flattened by every method as `unwrap` does it (by
+landmarks; the paper's preset with all vertices together, up to 2,000). Flips and times are sums, the others means weighted by vertices.
 
 {compare.chart_table(charts)}
 
 These charts are what stretch minimisation can bring under 1.1, not what an embedding finds easy: ears and limbs fold under every one of the
-three, and there the default model is not always ahead of Isomap: compare the flips and the stretch of each."""
+three, and there the default model is not ahead of Isomap on every chart: compare the flips and the stretch."""
 
 
 PRESET_NAMES = {"default": "default", "paper": "paper", "iso_charts": "iso_charts"}
@@ -188,8 +189,8 @@ def _preset_verdict(rows):
     count = {preset: sum(report["charts"] for _, name, report, _ in rows if name == preset) for preset in PRESET_NAMES}
     return (
         f"Charts in all: {count['default']} by the default, {count['iso_charts']} by iso-charts, {count['paper']} by the printed"
-        " model. Its folds are no hindrance to acceptance: flips are removed and the stretch is minimised before a chart is"
-        " judged, in all three."
+        " model. That the printed model folds does not matter here: with every preset, flips are removed and the stretch is"
+        " minimised before a chart is judged."
     )
 
 
@@ -231,7 +232,7 @@ def _limits():
   optimum of the model, not a bad start: random starts and the true solution end at the same likelihood. The 3:1 rectangle and the L above, which are
   flat, are turned over by half; other kernel widths make it worse, not better (an evenly meshed disc is the one flat shape found that it keeps). Nothing in the paper's figures contradicts this: flips are mentioned, and shown, and
   then removed by stretch minimisation.
-- **Misprints**, a test each in [the map](map.md). Equation (10) is x - ωB⁻¹∇F; figure 1 maximises; after (6), K = ∇²F - B; convergence is linear, not of second order; σ is a squared length.
+- **The paper has misprints**; [the map](map.md) names a test for each. Equation (10) is x - ωB⁻¹∇F; figure 1 maximises; after (6), K = ∇²F - B; convergence is linear, not of second order; σ is a squared length.
   The code follows what must have been meant.
 - **The paper's own models and program are not public**: neither its face, skull, goblin and cat nor the MATLAB program, nor the iso-charts
   code it was joined with. The surfaces here are generated (`native/paper/shapes.py`), of the sizes the paper names. "Similar and even better
