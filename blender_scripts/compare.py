@@ -122,10 +122,11 @@ def main(argv):
             objects = [obj for obj in asset_io.load(source) if targets.is_surface(obj)]
             if not objects:
                 raise bridge.MeshError("holds no faces")
+            given = {**asset_io.default_settings(source), **settings}
             models[key] = compare_objects(
-                objects, key, out, settings, threads=options.threads, picture_size=options.picture_size
+                objects, key, out, given, threads=options.threads, picture_size=options.picture_size
             )
-            models[key], reason = with_xatlas(models[key], objects, settings)
+            models[key], reason = with_xatlas(models[key], objects, given)
             if reason:
                 left_out[key] = reason
                 print(f"{name}: {reason}", flush=True)

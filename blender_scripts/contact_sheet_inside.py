@@ -96,10 +96,10 @@ def layout_of(objects, map_name, size):
     return pictures.layout(selection, bridge.read_uvs(selection), size)
 
 
-def unwrapped(objects, smart):
+def unwrapped(objects, settings, smart):
     """Unwraps into a UV map; rows by method, the first ours, each with its map."""
     comparison, task = addon_loader.load("comparison"), addon_loader.load("task")
-    settings = {"use_selection": False, "uv_map": "ACTIVE", "use_original_bounds": False}
+    settings = {**settings, "use_selection": False, "uv_map": "ACTIVE", "use_original_bounds": False}
     if smart:
         rows = comparison.compare(objects, settings)
         found = [(comparison.BLE_MAP, rows["ble_unwrap"], rows["ble_unwrap"]["seconds_total"])]
@@ -110,9 +110,9 @@ def unwrapped(objects, smart):
     return [(comparison.BLE_MAP, measured, outcome.seconds)]
 
 
-def cell_of(name, objects, work, options):
+def cell_of(name, objects, settings, work, options):
     """The finished cell of a model, and what was measured."""
-    rows = unwrapped(objects, options.compare == "smart")
+    rows = unwrapped(objects, settings, options.compare == "smart")
     map_name, measured, seconds = rows[0]
     picture = work.with_name(f".{work.stem}_render.png")
     panels = []
@@ -131,17 +131,20 @@ def cell_of(name, objects, work, options):
 
 
 def sources(models):
-    """(name, function that loads and returns objects) of each model."""
+    """(name, function that loads and returns objects, settings) of each model."""
     asset_io = addon_loader.load("asset_io")
     if models:
-        return [(Path(model).stem, lambda model=model: asset_io.load(model)) for model in models]
+        return [
+            (Path(model).stem, lambda model=model: asset_io.load(model), asset_io.default_settings(model))
+            for model in models
+        ]
 
     def made(make):
         asset_io.new_scene()
         return [make()]
 
     generated = {"suzanne": demo_meshes.suzanne, "spiral ramp": demo_meshes.spiral_ramp, "sculpt": demo_meshes.sculpt}
-    return [(name, lambda make=make: made(make)) for name, make in generated.items()]
+    return [(name, lambda make=make: made(make), {}) for name, make in generated.items()]
 
 
 def main(argv):
@@ -165,13 +168,13 @@ def main(argv):
         return batch.ENVIRONMENT
     cells, report, failed = [], {}, {}
     todo = sources(options.models)
-    for number, (name, load) in enumerate(todo, 1):
+    for number, (name, load, settings) in enumerate(todo, 1):
         started = time.perf_counter()
         try:
             objects = [obj for obj in load() if targets.is_surface(obj)]
             if not objects:
                 raise bridge.MeshError("holds no faces")
-            cell, report[name] = cell_of(name, objects, options.output, options)
+            cell, report[name] = cell_of(name, objects, settings, options.output, options)
             said = surface_report.summary(report[name], report[name]["seconds_total"])
         except (*batch.USER_ERRORS, RuntimeError, OSError) as error:
             cell = failed_cell(name, str(error), options.size, len(VIEWS) + (2 if options.compare else 1))

@@ -57,11 +57,12 @@ def demonstrate_mesh(objects, name, out, options):
     report = addon_loader.load("surface_report")
     faces = sum(len(obj.data.polygons) for obj in objects)
     print(f"{name}: {faces:,} faces; unwrapping by BLE Unwrap and Smart UV Project", flush=True)
-    rows = compare.compare_objects(objects, name, out, {}, progress=show_progress)
+    settings = addon_loader.load("asset_io").default_settings(options.mesh) if options.mesh else {}
+    rows = compare.compare_objects(objects, name, out, settings, progress=show_progress)
     end_progress()
     print(f"{name}: {report.summary(rows['ble_unwrap'], rows['ble_unwrap']['seconds_total'])}", flush=True)
     print(f"{name}: unwrapping by xatlas, which may take minutes", flush=True)
-    rows, reason = compare.with_xatlas(rows, objects, {})
+    rows, reason = compare.with_xatlas(rows, objects, settings)
     if reason:
         print(f"{name}: {reason}", flush=True)
     if options.render:

@@ -261,8 +261,9 @@ def _border_edges(selection, uv):
     corners = len(selection.corner_vertices)
     following = np.arange(1, corners + 1)
     following[selection.face_offsets[1:] - 1] = selection.face_offsets[:-1]
+    _, place = np.unique(selection.positions, axis=0, return_inverse=True)  # files split vertices at every face
     key = np.empty((corners, 3), np.int64)
-    key[:, 0] = selection.corner_vertices
+    key[:, 0] = place.reshape(-1)[selection.corner_vertices]
     key[:, 1:] = np.ascontiguousarray(uv, np.float32).view(np.int32)
     _, point = np.unique(key, axis=0, return_inverse=True)
     point = point.reshape(-1)

@@ -47,6 +47,15 @@ def test_the_border_is_drawn_and_smooth():
     assert len(set(edge)) > 3, "there are shades between"
 
 
+def test_no_border_is_drawn_where_only_vertices_are_split():
+    """As a file has it that stores every face with vertices of its own."""
+    selection, uv = sheet()
+    whole = pictures.layout(selection, uv, 200)
+    selection.positions = selection.positions[selection.corner_vertices]
+    selection.corner_vertices = np.arange(len(uv), dtype=np.int32)
+    assert np.array_equal(pictures.layout(selection, uv, 200), whole)
+
+
 def test_up_is_up():
     selection, uv = sheet()
     uv[:, 1] += 0.25

@@ -119,8 +119,7 @@ def process(planned, settings, arguments, evidence, stop):
     try:
         if planned.problem:
             raise asset_io.AssetError(planned.problem)
-        # These formats split vertices wherever normals or UVs differ.
-        settings = {"weld": asset_io.file_format(source) in asset_io.SPLIT_FORMATS, **settings}
+        settings = {**asset_io.default_settings(source), **settings}
         asset_io.load(source)
         external = resume.external_files()
         contents = asset_io.prepare(target)

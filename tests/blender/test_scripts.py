@@ -261,6 +261,18 @@ def test_compare_script(run_script, files, tmp_path):
     assert (tmp_path / "out/ball.blend").is_file()
 
 
+def test_scripts_weld_what_a_format_splits(run_script, files, tmp_path):
+    """A .glb has every face of the sphere apart: the charts are those of the mesh all the same."""
+    sphere()
+    source = files("ball.glb")
+    done = run_script("compare.py", source, "-o", "out", "--picture-size", "128", "--no-blend")
+    assert done.returncode == 0, done.stdout
+    assert json.loads((tmp_path / "out/compare.json").read_text())["models"]["ball"]["ble_unwrap"]["charts"] < 10
+    done = run_script("contact_sheet_inside.py", source, "-o", "sheet.png", "--size", "64")
+    assert done.returncode == 0, done.stdout
+    assert json.loads((tmp_path / "sheet.json").read_text())["models"]["ball"]["charts"] < 10
+
+
 XATLAS = """
 import numpy as np
 
