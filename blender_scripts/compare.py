@@ -90,12 +90,22 @@ def main(argv):
     batch, asset_io = addon_loader.load("batch"), addon_loader.load("asset_io")
     engine, bridge = addon_loader.load("engine"), addon_loader.load("mesh_bridge")
     targets, arguments = addon_loader.load("targets"), addon_loader.load("batch.arguments")
-    parser = argparse.ArgumentParser(prog="compare.py", description="BLE Unwrap against Smart UV Project and xatlas.")
-    parser.add_argument("inputs", nargs="+", metavar="IN")
-    parser.add_argument("-o", "--output", required=True, metavar="OUTDIR")
-    parser.add_argument("--picture-size", type=int, default=900, help="pixels of one layout (default: 900)")
-    parser.add_argument("--blend", action=argparse.BooleanOptionalAction, default=True, help="also write a .blend")
-    parser.add_argument("--threads", type=int, default=0)
+    parser = argparse.ArgumentParser(
+        prog="compare.py",
+        description="Unwrap meshes by BLE Unwrap, Smart UV Project and, where installed, xatlas, and compare.",
+    )
+    parser.add_argument("inputs", nargs="+", metavar="IN", help="files of meshes")
+    parser.add_argument("-o", "--output", required=True, metavar="OUTDIR", help="directory for the results")
+    parser.add_argument(
+        "--picture-size", type=int, default=900, help="pixels along a side of one layout (default: 900)"
+    )
+    parser.add_argument(
+        "--blend",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="also write the UV maps as a .blend (default: yes)",
+    )
+    parser.add_argument("--threads", type=int, default=0, help="processor threads, 0 for all (default: 0)")
     arguments.add_setting_arguments(parser)
     options = parser.parse_args(argv)
     settings = arguments.settings_of(options, parser)

@@ -36,14 +36,14 @@ def caption(name, measured, seconds):
     faces = int(measured["faces"])
     wrong = [f"{int(measured[key])} {key}" for key in ("flips", "overlaps") if measured.get(key)]
     figures = [
-        f"L2 {measured['l2']:.3f}",
+        f"stretch {measured['l2']:.3f}",
         f"worst chart {measured['l2_worst_chart']:.3f}",
-        f"Linf {measured['l_infinity']:.2f}",
-        f"seam {measured['seam_length']:.2f}",
-        f"pack {100 * measured['packing_efficiency']:.1f}%",
+        f"L-infinity {measured['l_infinity']:.2f}",
+        f"seams {measured['seam_length']:.2f}",
+        f"{100 * measured['packing_efficiency']:.1f}% used",
     ]
     counts = [f"{faces:,} faces", f"{charts} chart{'' if charts == 1 else 's'}", f"{seconds:.2f} s", *wrong]
-    return [name, "  ".join(counts), "  ".join(figures)]
+    return [name, ", ".join(counts), ", ".join(figures)]
 
 
 def titled(panels, lines, gap=GAP):
@@ -126,7 +126,7 @@ def cell_of(name, objects, settings, work, options):
     panels += [layout_of(objects, row[0], options.size) for row in rows]
     lines = caption(name, measured, seconds)
     if len(rows) > 1:
-        lines.append("Smart UV Project: " + "  ".join(caption("", *rows[1][1:])[1:]))
+        lines.append("Smart UV Project: " + ", ".join(caption("", *rows[1][1:])[1:]))
     return titled(panels, lines), {**measured, "seconds_total": seconds}
 
 

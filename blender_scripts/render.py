@@ -213,13 +213,15 @@ def has_map(obj, name):
 
 def main(argv):
     batch, asset_io = addon_loader.load("batch"), addon_loader.load("asset_io")
-    parser = argparse.ArgumentParser(prog="render.py", description="A model with a numbered colour grid on its UVs.")
-    parser.add_argument("input", metavar="IN")
-    parser.add_argument("-o", "--output", required=True, metavar="PICTURE.png")
+    parser = argparse.ArgumentParser(
+        prog="render.py", description="Render a model with a numbered colour grid as its texture."
+    )
+    parser.add_argument("input", metavar="IN", help="a file with UVs")
+    parser.add_argument("-o", "--output", required=True, metavar="PICTURE.png", help="the picture to write")
     parser.add_argument("--uv-map", help="UV map to show (default: the active one)")
-    parser.add_argument("--size", type=int, nargs=2, default=(960, 720), metavar=("WIDTH", "HEIGHT"))
+    parser.add_argument("--size", type=int, nargs=2, default=(960, 720), metavar=("WIDTH", "HEIGHT"), help="in pixels")
     parser.add_argument("--samples", type=int, default=32, help="light paths a pixel (default: 32)")
-    parser.add_argument("--cells", type=int, default=16, help="cells along a side of the grid (default: 16)")
+    parser.add_argument("--cells", type=int, default=16, help="cells along each side of the grid (default: 16)")
     options = parser.parse_args(argv)
     if not all(16 <= side <= 8192 for side in options.size) or not 1 <= options.samples <= 4096:
         parser.error("--size must be within 16 and 8192, --samples within 1 and 4096")

@@ -129,9 +129,11 @@ def variants(models):
 
 def main():
     parser = argparse.ArgumentParser(prog="make.py", description="The paper's figures and comparisons.")
-    parser.add_argument("models", nargs="*", metavar="MODEL.obj", help="your own instead of the generated ones")
-    parser.add_argument("-o", "--output", default=REPO / "out" / "paper", type=Path)
-    parser.add_argument("--render", action=argparse.BooleanOptionalAction, default=True)
+    parser.add_argument(
+        "models", nargs="*", metavar="MODEL.obj", help="models of your own instead of the generated ones"
+    )
+    parser.add_argument("-o", "--output", default=REPO / "out" / "paper", type=Path, help="(default: out/paper)")
+    parser.add_argument("--render", action=argparse.BooleanOptionalAction, default=True, help="(default: yes)")
     parser.add_argument("--quick", action="store_true", help="small sizes and no presets: to try the script")
     parser.add_argument("--publish", action="store_true", help="bring the page in native/paper up to date afterwards")
     options = parser.parse_args()

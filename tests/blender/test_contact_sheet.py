@@ -19,8 +19,8 @@ MEASURED = {
 def test_caption():
     name, counts, figures = inside.caption("fandisk", MEASURED, 0.519)
     assert name == "fandisk"
-    assert counts == "12,946 faces  1 chart  0.52 s  3 overlaps"
-    assert figures == "L2 1.027  worst chart 1.038  Linf 2.23  seam 2.32  pack 64.7%"
+    assert counts == "12,946 faces, 1 chart, 0.52 s, 3 overlaps"
+    assert figures == "stretch 1.027, worst chart 1.038, L-infinity 2.23, seams 2.32, 64.7% used"
 
 
 def test_a_caption_fits_its_cell():
