@@ -214,6 +214,12 @@ def test_the_page_says_what_it_was_measured_on():
     assert "Measured with commit 0123abc (2020-02-03) on 2 cores of a machine." in head
 
 
+@pytest.mark.parametrize(("last", "said"), [(0.1, "linearly"), (0.2, "in this run faster than linearly")])
+def test_the_page_calls_linear_what_was(last, said):
+    text = page._scaling([(10_000, 0.0, 0.01), (100_000, 0.0, last)], [])
+    assert f"of their number: {said}, at a fixed number" in text
+
+
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
