@@ -3,7 +3,8 @@
 # make bench  times of the stages; make flamegraph where the time of one unwrap goes; make scaling time and memory against faces
 # make quality  charts, stretch, seams, packing and CPU seconds over shuffled triangulations: for before and after a change
 # make contact-sheet  every model under a checker beside its layout, in one picture: out/contact_sheet.png
-# make paper  the paper's figures and its comparison with Isomap, measured anew: out/paper/ and native/paper/
+# make paper  the paper's figures and its comparison with Isomap, measured anew: out/paper/; make paper-page the same, and
+#             brings the page in native/paper up to date, of the last commit
 # Knobs: PYTHON (3.11 or later), CARGO, MESH=file for the demo and the flame graph (.obj), BLENDER=/path/to/blender for a
 # real one instead of bpy, MODELS="a.obj b.obj" for the paper's figure 3 and its table, for the scaling and the quality (.ply,
 # .ply.gz, too) and for the contact sheet, COMPARE=smart for a third picture a model there, SHUFFLES=4 for the quality.
@@ -13,11 +14,12 @@ CARGO ?= cargo
 VENV := .venv-py
 BIN := $(VENV)/bin
 WHEELS := addon/wheels
+CRATES := native/ble_unwrap_core native/ble_unwrap_native
 # What the wheel is made of. Official Blender runs on glibc 2.28, which zig links against on any newer system.
-NATIVE := Cargo.toml Cargo.lock .ci/build_wheel .ci/third_party_licenses $(shell find native -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' 2>/dev/null)
+NATIVE := Cargo.toml Cargo.lock .ci/build_wheel .ci/third_party_licenses $(shell find $(CRATES) -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' 2>/dev/null)
 
 .PHONY: test test-rust test-python test-blender bench flamegraph scaling quality contact-sheet lint format venv wheel zip demo \
-	paper clean
+	paper paper-page clean
 
 test: test-rust lint test-python test-blender
 
@@ -43,14 +45,14 @@ quality: $(VENV)/.wheel
 
 contact-sheet: zip
 	.ci/blender_libraries
-	$(PYTHON) .ci/contact_sheet $(MODELS) $(if $(COMPARE),--compare $(COMPARE))
+	$(BIN)/python .ci/contact_sheet $(MODELS) $(if $(COMPARE),--compare $(COMPARE))
 
 test-python: $(VENV)/.wheel
 	$(BIN)/python -m pytest tests --ignore=tests/blender
 
 test-blender: zip
 	.ci/blender_libraries
-	$(PYTHON) .ci/test_blender
+	$(BIN)/python .ci/test_blender
 
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .
@@ -70,11 +72,15 @@ zip: wheel
 
 demo: zip
 	.ci/blender_libraries
-	$(PYTHON) .ci/demo $(MESH)
+	$(BIN)/python .ci/demo $(MESH)
 
 paper: $(VENV)/.wheel $(VENV)/.paper
 	.ci/blender_libraries
 	$(BIN)/python .ci/paper $(MODELS)
+
+paper-page: $(VENV)/.wheel $(VENV)/.paper
+	.ci/blender_libraries
+	$(BIN)/python .ci/paper --publish
 
 clean:
 	rm -rf target out .cache $(VENV) $(WHEELS)/*.whl $(WHEELS)/.built

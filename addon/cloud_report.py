@@ -1,6 +1,7 @@
-"""Judging the map of a cloud: a certificate, one line, and the lines of the panel. For surfaces, see engine.py."""
+"""Judging the map of a cloud: a certificate, one line, and the lines of the panel. For surfaces: surface_report.py."""
 
-from .engine import STRETCH_SLACK, Certificate, counted, number_text
+from .certificate import STRETCH_SLACK, Certificate
+from .wording import counted, number_text
 
 
 def measured(result, written, held):

@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 
-from . import cloud_bridge, cloud_report, engine, properties
+from . import cloud_bridge, cloud_report, computation, properties
 from .task import Outcome, Timer, bounds_to_keep, placed
 
 
@@ -47,12 +47,12 @@ class CloudTask:
     def run(self):
         """Computes the result at once."""
         self.timer.start()
-        return engine.unwrap_points(self.cloud.positions, self.native)
+        return computation.unwrap_points(self.cloud.positions, self.native)
 
     def start(self):
-        """Computes the result on another thread: an `engine.Job`."""
+        """Computes the result on another thread: an `computation.Job`."""
         self.timer.start()
-        return engine.submit_unwrap_points(self.cloud.positions, self.native)
+        return computation.submit_unwrap_points(self.cloud.positions, self.native)
 
     def check(self):
         """Raises `mesh_bridge.MeshError` where `write` would."""

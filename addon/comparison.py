@@ -5,7 +5,7 @@ import time
 
 import bpy
 
-from . import engine, mesh_bridge, properties, textures
+from . import measurement, mesh_bridge, properties, surface_report, textures
 from .faces import uv_selected_faces
 from .task import unwrap_objects
 
@@ -44,7 +44,7 @@ def measure_active(objects, *, margin, texture_size):
     held = mesh_bridge.read_uvs(selection)
     if held is None:
         raise mesh_bridge.MeshError("An object has no UV map to measure")
-    return engine.measure(selection, held, texture_size=texture_size, margin=margin)
+    return measurement.measure(selection, held, texture_size=texture_size, margin=margin)
 
 
 def best_smart_uv(objects, *, margin, texture_size, angles=ANGLES, map_name=SMART_MAP):
@@ -90,7 +90,7 @@ def compare(objects, settings, *, angles=ANGLES, threads=0, progress=None):
     rows["ble_unwrap"]["blender_overlapping_faces"] = overlapping_faces(objects)
     by_angle, best = best_smart_uv(objects, angles=angles, map_name=SMART_MAP, **target)
     for measured in by_angle.values():
-        measured["violations"] = engine.certify(
+        measured["violations"] = surface_report.certify(
             measured, margin=settings["margin"], stretch_limit=settings["stretch_limit"]
         ).violations
     by_angle[best]["blender_overlapping_faces"] = overlapping_faces(objects)

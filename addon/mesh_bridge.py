@@ -215,16 +215,16 @@ def scale_as_in_scene(positions, matrix_world):
     """
     matrix = np.array(matrix_world.to_3x3(), np.float64)
     if not np.isfinite(matrix).all():
-        return positions, "its transform is not finite and was left out"
+        return positions, "its transform is not finite and was ignored"
     values, vectors = np.linalg.eigh(matrix.T @ matrix)
     scales = np.sqrt(np.maximum(values, 0.0))
     if scales[0] <= 1e-6 * max(scales[-1], 1e-30):
-        return positions, "its scale is zero along an axis and was left out"
+        return positions, "its scale is zero along an axis and was ignored"
     if scales[-1] - scales[0] <= SCALE_TOLERANCE * scales[-1]:
         return (positions * np.float32(np.cbrt(scales.prod()))), None
     factor = (vectors * scales) @ vectors.T
     return (positions.astype(np.float64) @ factor).astype(np.float32), (
-        "non-uniform scale; unwrapped as it appears in the scene"
+        "non-uniform scale; it was unwrapped with the proportions that it has in the scene"
     )
 
 

@@ -72,7 +72,7 @@ class _Certificate:
         if certificate.crowded:
             number = f"{certificate.crowded:,} Edge{'' if certificate.crowded == 1 else 's'}"
             self.layout.operator(
-                "mesh.ble_unwrap_select_edges", text=f"Select {number} of More than Two Faces", icon="EDGESEL"
+                "mesh.ble_unwrap_select_edges", text=f"Select {number} with More than Two Faces", icon="EDGESEL"
             )
 
 

@@ -24,7 +24,7 @@ class BLEUnwrapPreferences(bpy.types.AddonPreferences):
     )
     measure_again: BoolProperty(
         name="Certify",
-        description="After writing, read the UVs back from the mesh and measure them again for the certificate",
+        description="After writing, read the UVs back from the mesh and measure these, not those that were computed",
         default=True,
     )
 

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import engine, mesh_bridge, properties, textures, units, uv_maps
+from . import computation, engine, measurement, mesh_bridge, properties, surface_report, textures, units, uv_maps
+from .certificate import Certificate
+from .wording import counted
 
 POLL_SECONDS = 0.02
 SMALLEST_BOUNDS = 1e-4  # of the unit square: a smaller rectangle is no place to pack into
@@ -16,7 +18,7 @@ class Outcome:
     """What a written unwrap came to."""
 
     title: str
-    certificate: engine.Certificate
+    certificate: Certificate
     report: dict  # of the native module
     seconds: float
     summary: str
@@ -113,11 +115,11 @@ class UnwrapTask:
 
     def run(self):
         """Computes the result at once."""
-        return self._call(engine.unwrap)
+        return self._call(computation.unwrap)
 
     def start(self):
-        """Computes the result on another thread: an `engine.Job`."""
-        return self._call(engine.submit_unwrap)
+        """Computes the result on another thread: an `computation.Job`."""
+        return self._call(computation.submit_unwrap)
 
     def check(self):
         """Raises `mesh_bridge.MeshError` where `write` would: several tasks are written together or not at all."""
@@ -136,7 +138,7 @@ class UnwrapTask:
         if measure_again:
             given = {name: self.settings[name] for name in ("texture_size", "margin", "weld", "weld_distance")}
             try:
-                measured = engine.measure(self.selection, held, **given)
+                measured = measurement.measure(self.selection, held, **given)
             except engine.EngineError as error:  # the UVs are written: say what is known
                 warnings.append(f"The written UVs could not be measured: {error}")
         if kept := mesh_bridge.kept_faces(self.selection, whole):
@@ -144,18 +146,20 @@ class UnwrapTask:
             measured = {**measured, "overlaps_with_kept": overlaps}
             if overlaps:
                 warnings.append(
-                    f"New charts lie on faces that were kept, {engine.counted(overlaps, 'pair')} of triangles: select "
-                    "those faces, too, turn on Keep Place, or pack all charts afterwards (UV > Pack Islands)"
+                    f"New charts overlap faces that were not unwrapped ({counted(overlaps, 'pair')} of triangles): "
+                    "select those faces, too, turn on Keep Place, or pack all charts afterwards (UV > Pack Islands)"
                 )
-        certificate = engine.certify(measured, margin=margin, warnings=warnings, **limit)
+        certificate = surface_report.certify(measured, margin=margin, warnings=warnings, **limit)
         seconds = self.timer.seconds()
         return Outcome(
             title=self.selection.title,
             certificate=certificate,
             report=result.report,
             seconds=seconds,
-            summary=engine.summary(measured, seconds),
-            lines=engine.lines(certificate, margin=margin, **limit, notes=self.notes, length_text=units.length_text),
+            summary=surface_report.summary(measured, seconds),
+            lines=surface_report.lines(
+                certificate, margin=margin, **limit, notes=self.notes, length_text=units.length_text
+            ),
             maps=mesh_bridge.active_maps(self.selection),
         )
 
@@ -166,7 +170,7 @@ class UnwrapTask:
         if triangles is None:
             triangles = np.arange(len(chosen.corner_vertices), dtype=np.int32).reshape(-1, 3)
         unwrapped = (chosen.positions, chosen.corner_vertices, chosen.face_offsets, triangles, held)
-        return engine.overlaps_between(unwrapped, kept)
+        return measurement.overlaps_between(unwrapped, kept)
 
 
 @dataclass
@@ -181,10 +185,10 @@ class Bounds:
 def bounds_to_keep(uv, texture_size):
     """The rectangle that UVs (n, 2) fill, in whole pixels, and None; or None and why there is nothing to pack into."""
     if uv is None or not np.isfinite(uv).all():
-        return None, "There were no UVs whose place could be kept"
+        return None, "There were no old UVs whose place could be kept; the whole texture was used"
     low, high = uv.min(axis=0).astype(float), uv.max(axis=0).astype(float)
     if (high - low).min() < SMALLEST_BOUNDS:
-        return None, "The old UVs fill no rectangle; the whole square was used"
+        return None, "The old UVs lie on one line or point, so they have no place to keep; the whole texture was used"
     pixels = np.maximum(1, np.floor((high - low) * texture_size)).astype(int)
     return Bounds(low, pixels / texture_size, (int(pixels[0]), int(pixels[1]))), None
 

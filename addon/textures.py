@@ -86,8 +86,9 @@ def replaced_note(obj, map_name):
     others = f" and {more} more" if more else ""
     moved = ", and its Mapping node moves it" if any(use.moved for use in uses) else ""
     return (
-        f"{obj.name}: {map_name} was replaced, which material {first.material.name} uses for {first.image.name}{others}"
-        f"{moved}. What was painted no longer fits; to keep its layout, write another UV map by name"
+        f"{obj.name}: the UV map {map_name} was replaced, which material {first.material.name} uses for the image "
+        f"{first.image.name}{others}{moved}. Such an image no longer fits the surface; to keep the old map, undo, and "
+        "set UV Map to By Name"
     )
 
 
@@ -117,5 +118,5 @@ def proportioned_size(objects, map_names, texture_size):
     mixed = any(abs(other - ratio) > RATIO_TOLERANCE * ratio for other in ratios.values())
     if size == texture_size and not mixed:
         return texture_size, None
-    note = f"Laid out for {size[0]} × {size[1]} pixels, the proportions of {image.name}"
-    return size, f"{note}; other images have others" if mixed else note
+    note = f"Laid out for {size[0]} × {size[1]} pixels, the proportions of the image {image.name}"
+    return size, f"{note}; other images have other proportions" if mixed else note

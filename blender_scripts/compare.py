@@ -4,7 +4,8 @@ blender -b -P blender_scripts/compare.py -- IN... -o OUTDIR [--margin 4] [--text
 python blender_scripts/compare.py IN... -o OUTDIR [settings]
 
 Writes OUTDIR/compare.json, a picture of the first two layouts a model, coloured by stretch, and a .blend with their UV
-maps (`--no-blend` leaves it out). xatlas knows triangles only and may cut between two of one polygon, so its layout is
+maps (`--no-blend` leaves it out). The pictures need Pillow; where there is none, a sentence says how to install it, and
+all else is written. xatlas knows triangles only and may cut between two of one polygon, so its layout is
 measured on the triangles and is no UV map. Exit codes as for unwrap.py.
 """
 
@@ -17,31 +18,43 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import addon_loader
 import numpy as np
-import pictures
 import tables
 import xatlas_peer
 
+try:
+    import pictures
+except ImportError as error:
+    pictures, no_pictures = None, str(error)
+else:
+    no_pictures = None
+
 
 def compare_objects(objects, name, out, settings, *, threads=0, picture_size=900, progress=None):
-    """Compares on objects of the current scene and draws the picture; the rows of the table."""
+    """Compares on objects of the current scene and draws the picture, if it can; the rows of the table."""
+    rows = addon_loader.load("comparison").compare(objects, settings, threads=threads, progress=progress)
+    out.mkdir(parents=True, exist_ok=True)
+    if pictures:
+        draw_layouts(objects, rows, out / f"{name}_layout.png", picture_size)
+    return rows
+
+
+def draw_layouts(objects, rows, path, size):
+    """Draws the layouts by BLE Unwrap and Smart UV Project beside each other, over a legend."""
     comparison, bridge = addon_loader.load("comparison"), addon_loader.load("mesh_bridge")
-    rows = comparison.compare(objects, settings, threads=threads, progress=progress)
     panels = []
     for key, map_name in (("ble_unwrap", comparison.BLE_MAP), ("smart_uv_best", comparison.SMART_MAP)):
         comparison.activate_map(bridge.unique_meshes(objects), map_name)
         selection = bridge.gather(bridge.unique_meshes(objects))
-        picture = pictures.layout(selection, bridge.read_uvs(selection), picture_size)
+        picture = pictures.layout(selection, bridge.read_uvs(selection), size)
         panels.append(pictures.with_captions(picture, tables.caption(key, rows[key])))
     comparison.activate_map(bridge.unique_meshes(objects), comparison.BLE_MAP)
     picture = pictures.side_by_side(panels)
-    out.mkdir(parents=True, exist_ok=True)
-    pictures.write_png(out / f"{name}_layout.png", pictures.stacked([picture, pictures.legend(picture.shape[1])]))
-    return rows
+    pictures.write_png(path, pictures.stacked([picture, pictures.legend(picture.shape[1])]))
 
 
 def xatlas_row(objects, settings):
     """The measurement of a layout by xatlas of the same objects. Raises `xatlas_peer.Unavailable`."""
-    engine, bridge = addon_loader.load("engine"), addon_loader.load("mesh_bridge")
+    measurement, bridge = addon_loader.load("measurement"), addon_loader.load("mesh_bridge")
     properties = addon_loader.load("properties")
     full = {**properties.default_values(settings.get("preset", "DEFAULT")), **settings}
     selection = bridge.gather(bridge.unique_meshes(objects))
@@ -61,7 +74,7 @@ def xatlas_row(objects, settings):
         texture_size=full["texture_size"],
     )
     # Its texture has a size of its own, by which its UVs are divided: stretch and margin are in the texels of that.
-    measured = engine.measure(triangles, peer.uv, texture_size=peer.texture_size, margin=full["margin"])
+    measured = measurement.measure(triangles, peer.uv, texture_size=peer.texture_size, margin=full["margin"])
     return {**measured, "seconds_total": peer.seconds, "texture_size": peer.texture_size}
 
 
@@ -77,12 +90,22 @@ def main(argv):
     batch, asset_io = addon_loader.load("batch"), addon_loader.load("asset_io")
     engine, bridge = addon_loader.load("engine"), addon_loader.load("mesh_bridge")
     targets, arguments = addon_loader.load("targets"), addon_loader.load("batch.arguments")
-    parser = argparse.ArgumentParser(prog="compare.py", description="BLE Unwrap against Smart UV Project and xatlas.")
-    parser.add_argument("inputs", nargs="+", metavar="IN")
-    parser.add_argument("-o", "--output", required=True, metavar="OUTDIR")
-    parser.add_argument("--picture-size", type=int, default=900, help="pixels of one layout (default: 900)")
-    parser.add_argument("--blend", action=argparse.BooleanOptionalAction, default=True, help="also write a .blend")
-    parser.add_argument("--threads", type=int, default=0)
+    parser = argparse.ArgumentParser(
+        prog="compare.py",
+        description="Unwrap meshes by BLE Unwrap, Smart UV Project and, where installed, xatlas, and compare.",
+    )
+    parser.add_argument("inputs", nargs="+", metavar="IN", help="files of meshes")
+    parser.add_argument("-o", "--output", required=True, metavar="OUTDIR", help="directory for the results")
+    parser.add_argument(
+        "--picture-size", type=int, default=900, help="pixels along a side of one layout (default: 900)"
+    )
+    parser.add_argument(
+        "--blend",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="also write the UV maps as a .blend (default: yes)",
+    )
+    parser.add_argument("--threads", type=int, default=0, help="processor threads, 0 for all (default: 0)")
     arguments.add_setting_arguments(parser)
     options = parser.parse_args(argv)
     settings = arguments.settings_of(options, parser)
@@ -98,6 +121,8 @@ def main(argv):
     except OSError as error:
         print(f"compare.py: cannot write to {out}: {error.strerror}", file=sys.stderr)
         return batch.SOME_FAILED
+    if no_pictures:
+        print(f"no pictures: {no_pictures}", flush=True)
     models, failed, left_out = {}, {}, {}
     for number, name in enumerate(options.inputs, 1):
         print(f"[{number}/{len(options.inputs)}] {name}", flush=True)
@@ -107,10 +132,11 @@ def main(argv):
             objects = [obj for obj in asset_io.load(source) if targets.is_surface(obj)]
             if not objects:
                 raise bridge.MeshError("holds no faces")
+            given = {**asset_io.default_settings(source), **settings}
             models[key] = compare_objects(
-                objects, key, out, settings, threads=options.threads, picture_size=options.picture_size
+                objects, key, out, given, threads=options.threads, picture_size=options.picture_size
             )
-            models[key], reason = with_xatlas(models[key], objects, settings)
+            models[key], reason = with_xatlas(models[key], objects, given)
             if reason:
                 left_out[key] = reason
                 print(f"{name}: {reason}", flush=True)

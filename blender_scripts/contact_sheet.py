@@ -24,9 +24,19 @@ def development_models(directory=DEVELOPMENT_MODELS):
 
 
 def main():
-    parser = argparse.ArgumentParser(prog="contact_sheet.py", description="One picture of many models' atlases.")
-    parser.add_argument("models", nargs="*", metavar="MODEL", help=".blend .obj .glb .gltf .ply .stl .fbx")
-    parser.add_argument("-o", "--output", default=launch.REPO / "out" / "contact_sheet.png", help="the picture")
+    parser = argparse.ArgumentParser(
+        prog="contact_sheet.py",
+        description="One picture of many models with a checker texture, each beside its UV layout.",
+    )
+    parser.add_argument(
+        "models", nargs="*", metavar="MODEL", help="files of meshes: .blend .obj .glb .gltf .ply .stl .fbx"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        default=launch.REPO / "out" / "contact_sheet.png",
+        help="the picture to write (default: out/contact_sheet.png)",
+    )
     parser.add_argument("--compare", choices=["smart"], help="add the layout of Smart UV Project to every model")
     parser.add_argument("--zip", help="the extension (default: the one that `make zip` built)")
     options = parser.parse_args()

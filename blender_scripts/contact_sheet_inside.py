@@ -27,7 +27,7 @@ SIZE = 360
 VIEWS = ((0.62, -1.0, 0.42), (-0.62, 1.0, 0.42))
 COLUMNS = 3
 GAP = 14
-NAME_SCALE, TEXT_SCALE = 3, 2
+NAME_SIZE, TEXT_SIZE = 24, 16  # of the captions, in pixels
 
 
 def caption(name, measured, seconds):
@@ -36,14 +36,14 @@ def caption(name, measured, seconds):
     faces = int(measured["faces"])
     wrong = [f"{int(measured[key])} {key}" for key in ("flips", "overlaps") if measured.get(key)]
     figures = [
-        f"L2 {measured['l2']:.3f}",
+        f"stretch {measured['l2']:.3f}",
         f"worst chart {measured['l2_worst_chart']:.3f}",
-        f"Linf {measured['l_infinity']:.2f}",
-        f"seam {measured['seam_length']:.2f}",
-        f"pack {100 * measured['packing_efficiency']:.1f}%",
+        f"L-infinity {measured['l_infinity']:.2f}",
+        f"seams {measured['seam_length']:.2f}",
+        f"{100 * measured['packing_efficiency']:.1f}% used",
     ]
     counts = [f"{faces:,} faces", f"{charts} chart{'' if charts == 1 else 's'}", f"{seconds:.2f} s", *wrong]
-    return [name, "  ".join(counts), "  ".join(figures)]
+    return [name, ", ".join(counts), ", ".join(figures)]
 
 
 def titled(panels, lines, gap=GAP):
@@ -51,17 +51,21 @@ def titled(panels, lines, gap=GAP):
     row = []
     for number, panel in enumerate(panels):
         if number:
-            row.append(_plain(panel.shape[0], gap))
+            row.append(pictures.plain(panel.shape[0], gap))
         row.append(panel)
     body = np.concatenate(row, axis=1)
-    heights = [10 * (NAME_SCALE if number == 0 else TEXT_SCALE) for number in range(len(lines))]
-    head = _plain(sum(heights) + 6, body.shape[1])
+    head = pictures.plain(head_height(len(lines)), body.shape[1])
     y = 4
-    for number, (text, height) in enumerate(zip(lines, heights, strict=True)):
-        scale = NAME_SCALE if number == 0 else TEXT_SCALE
-        pictures.draw_text(head, text[: body.shape[1] // (6 * scale)], 0, y, scale)
-        y += height
+    for number, text in enumerate(lines):
+        size = NAME_SIZE if number == 0 else TEXT_SIZE
+        pictures.draw_text(head, pictures.shortened(text, body.shape[1], size), 0, y, size)
+        y += pictures.line_height(size)
     return np.concatenate([head, body])
+
+
+def head_height(lines):
+    """Pixels above the panels for so many lines of caption."""
+    return pictures.line_height(NAME_SIZE) + (lines - 1) * pictures.line_height(TEXT_SIZE) + 8
 
 
 def sheet(cells, columns=COLUMNS, gap=GAP):
@@ -70,7 +74,7 @@ def sheet(cells, columns=COLUMNS, gap=GAP):
     height, width, _ = cells[0].shape
     rows = -(-len(cells) // columns)
     strip = pictures.legend(columns * (width + 2 * gap))
-    canvas = _plain(rows * (height + 2 * gap) + strip.shape[0] + gap, strip.shape[1])
+    canvas = pictures.plain(rows * (height + 2 * gap) + strip.shape[0] + gap, strip.shape[1])
     for number, cell in enumerate(cells):
         row, column = divmod(number, columns)
         top, left = row * (height + 2 * gap) + gap, column * (width + 2 * gap) + gap
@@ -81,14 +85,8 @@ def sheet(cells, columns=COLUMNS, gap=GAP):
 
 def failed_cell(name, reason, size, panels):
     """A cell that says what went wrong."""
-    empty = np.broadcast_to(pictures.EMPTY, (size, size, 3))
+    empty = pictures.plain(size, size, pictures.EMPTY)
     return titled([empty] * panels, [name, "failed", reason])
-
-
-def _plain(height, width):
-    canvas = np.empty((height, width, 3), np.uint8)
-    canvas[:] = pictures.BACKGROUND
-    return canvas
 
 
 def layout_of(objects, map_name, size):
@@ -98,10 +96,10 @@ def layout_of(objects, map_name, size):
     return pictures.layout(selection, bridge.read_uvs(selection), size)
 
 
-def unwrapped(objects, smart):
+def unwrapped(objects, settings, smart):
     """Unwraps into a UV map; rows by method, the first ours, each with its map."""
     comparison, task = addon_loader.load("comparison"), addon_loader.load("task")
-    settings = {"use_selection": False, "uv_map": "ACTIVE", "use_original_bounds": False}
+    settings = {**settings, "use_selection": False, "uv_map": "ACTIVE", "use_original_bounds": False}
     if smart:
         rows = comparison.compare(objects, settings)
         found = [(comparison.BLE_MAP, rows["ble_unwrap"], rows["ble_unwrap"]["seconds_total"])]
@@ -112,9 +110,9 @@ def unwrapped(objects, smart):
     return [(comparison.BLE_MAP, measured, outcome.seconds)]
 
 
-def cell_of(name, objects, work, options):
+def cell_of(name, objects, settings, work, options):
     """The finished cell of a model, and what was measured."""
-    rows = unwrapped(objects, options.compare == "smart")
+    rows = unwrapped(objects, settings, options.compare == "smart")
     map_name, measured, seconds = rows[0]
     picture = work.with_name(f".{work.stem}_render.png")
     panels = []
@@ -123,31 +121,36 @@ def cell_of(name, objects, work, options):
         render.render_objects(
             objects, picture, map_name, size=size, samples=SAMPLES, cells=CELLS, plain=True, view=view
         )
-        panels.append(render.taken(picture))
+        panels.append(pictures.read_png(picture))
+        picture.unlink()
     panels += [layout_of(objects, row[0], options.size) for row in rows]
     lines = caption(name, measured, seconds)
     if len(rows) > 1:
-        lines.append("Smart UV Project: " + "  ".join(caption("", *rows[1][1:])[1:])[: panels[0].shape[1]])
+        lines.append("Smart UV Project: " + ", ".join(caption("", *rows[1][1:])[1:]))
     return titled(panels, lines), {**measured, "seconds_total": seconds}
 
 
 def sources(models):
-    """(name, function that loads and returns objects) of each model."""
+    """(name, function that loads and returns objects, settings) of each model."""
     asset_io = addon_loader.load("asset_io")
     if models:
-        return [(Path(model).stem, lambda model=model: asset_io.load(model)) for model in models]
+        return [
+            (Path(model).stem, lambda model=model: asset_io.load(model), asset_io.default_settings(model))
+            for model in models
+        ]
 
     def made(make):
         asset_io.new_scene()
         return [make()]
 
     generated = {"suzanne": demo_meshes.suzanne, "spiral ramp": demo_meshes.spiral_ramp, "sculpt": demo_meshes.sculpt}
-    return [(name, lambda make=make: made(make)) for name, make in generated.items()]
+    return [(name, lambda make=make: made(make), {}) for name, make in generated.items()]
 
 
 def main(argv):
     batch, targets = addon_loader.load("batch"), addon_loader.load("targets")
     bridge, engine = addon_loader.load("mesh_bridge"), addon_loader.load("engine")
+    surface_report = addon_loader.load("surface_report")
     parser = argparse.ArgumentParser(prog="contact_sheet_inside.py")
     parser.add_argument("models", nargs="*", metavar="MODEL")
     parser.add_argument("-o", "--output", required=True, type=Path)
@@ -165,14 +168,14 @@ def main(argv):
         return batch.ENVIRONMENT
     cells, report, failed = [], {}, {}
     todo = sources(options.models)
-    for number, (name, load) in enumerate(todo, 1):
+    for number, (name, load, settings) in enumerate(todo, 1):
         started = time.perf_counter()
         try:
             objects = [obj for obj in load() if targets.is_surface(obj)]
             if not objects:
                 raise bridge.MeshError("holds no faces")
-            cell, report[name] = cell_of(name, objects, options.output, options)
-            said = engine.summary(report[name], report[name]["seconds_total"])
+            cell, report[name] = cell_of(name, objects, settings, options.output, options)
+            said = surface_report.summary(report[name], report[name]["seconds_total"])
         except (*batch.USER_ERRORS, RuntimeError, OSError) as error:
             cell = failed_cell(name, str(error), options.size, len(VIEWS) + (2 if options.compare else 1))
             failed[name] = str(error)
@@ -181,7 +184,7 @@ def main(argv):
         spent = time.perf_counter() - started
         print(f"[{number}/{len(todo)}] {name}: {said} ({spent:.1f} s with the pictures)", flush=True)
     height = max(cell.shape[0] for cell in cells)
-    cells = [np.concatenate([cell, _plain(height - cell.shape[0], cell.shape[1])]) for cell in cells]
+    cells = [np.concatenate([cell, pictures.plain(height - cell.shape[0], cell.shape[1])]) for cell in cells]
     pictures.write_png(options.output, sheet(cells, options.columns))
     addon_loader.load("batch.report").write_json(
         options.output.with_suffix(".json"), {"models": report, "failed": failed}
@@ -191,7 +194,7 @@ def main(argv):
         return batch.SOME_FAILED
     broken = {name: found["violations"] for name, found in report.items() if found["violations"]}
     for name, violations in broken.items():
-        print(f"{name}: certificate does not hold: {'; '.join(violations)}", file=sys.stderr)
+        print(f"{name}: not as promised: {'; '.join(violations)}", file=sys.stderr)
     return batch.VIOLATED if broken else batch.OK
 
 

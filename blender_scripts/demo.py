@@ -17,13 +17,20 @@ import launch
 
 
 def main():
-    parser = argparse.ArgumentParser(prog="demo.py", description="Unwrap demonstration meshes, or one of your own.")
-    parser.add_argument(
-        "mesh", nargs="?", help="your own file instead, of meshes or points: .blend .obj .glb .gltf .ply .stl .fbx"
+    parser = argparse.ArgumentParser(
+        prog="demo.py",
+        description="Unwrap demonstration meshes, or one of your own, and compare with Smart UV Project.",
     )
-    parser.add_argument("-o", "--output", default=launch.REPO / "out", help="directory of the results (default: out)")
+    parser.add_argument(
+        "mesh",
+        nargs="?",
+        help="a file of your own in place of the demonstration's: .blend .obj .glb .gltf .ply .stl .fbx",
+    )
+    parser.add_argument("-o", "--output", default=launch.REPO / "out", help="directory for the results (default: out)")
     parser.add_argument("--zip", help="the extension (default: the one that `make zip` built)")
-    parser.add_argument("--render", action=argparse.BooleanOptionalAction, default=True, help="also render pictures")
+    parser.add_argument(
+        "--render", action=argparse.BooleanOptionalAction, default=True, help="also render the models (default: yes)"
+    )
     options = parser.parse_args()
     if options.mesh and not Path(options.mesh).is_file():
         parser.error(f"{options.mesh}: no such file")

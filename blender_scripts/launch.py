@@ -54,14 +54,15 @@ class BpyModule:
         self.key = f"bpy-{version}"
         if version not in PYTHON_OF_BPY:
             raise Unavailable(f"bpy {version} is unknown; known are {', '.join(PYTHON_OF_BPY)}")
-        python_version = PYTHON_OF_BPY[version]
+        self.python_version = PYTHON_OF_BPY[version]
         home = CACHE / self.key
         self.python = home / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+        self.pip = [self.python, "-m", "pip"]
         ready = home / ".ready"
         if ready.exists() and self._works():
             return
-        python = find_python(python_version)
-        say(f"Installing {self.name} for Python {python_version} in {home.relative_to(REPO)} (about 370 MB, once)")
+        python = find_python(self.python_version)
+        say(f"Installing {self.name} for Python {self.python_version} in {home.relative_to(REPO)} (370 MB, once)")
         install = [self.python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
         try:
             subprocess.run([python, "-m", "venv", "--clear", home], check=True)
@@ -102,6 +103,17 @@ class BlenderProgram:
             raise Unavailable(f"{path} is {match[0]}, and 4.2 is the oldest with extensions")
         self.name = match[0]
         self.key = match[0].lower().replace(" ", "-")
+        self.python_version = self._asked_python_version()
+        self.pip = [sys.executable, "-m", "pip"]
+
+    def _asked_python_version(self):
+        ask = "import sys; print('its Python is %d.%d' % sys.version_info[:2])"
+        command = [self.path, "--background", "--factory-startup", "--python-expr", ask]
+        found = subprocess.run(command, capture_output=True, text=True, check=False)
+        match = re.search(r"its Python is (\d+\.\d+)", found.stdout)
+        if not match:
+            raise Unavailable(f"{self.path} does not run Python:\n{found.stderr.strip()}")
+        return match[1]
 
     def command(self, script, arguments):
         options = ["--background", "--factory-startup", "--python-exit-code", "9"]
@@ -168,24 +180,39 @@ def find_archive(given=None):
     return archives[-1]
 
 
-def xatlas_library(blender):
-    """A directory with xatlas for the Python of a Blender, made on first use; None where it cannot be: why is printed.
+def library_directory(name, python_version):
+    """Where `library` puts a package for Pythons of a version, such as "3.11"."""
+    return CACHE / f"{name}-python-{python_version}"
 
-    It is kept apart from the Blender and its packages.
+
+def library(blender, name):
+    """A directory with a package for the Python of a Blender, installed on first use as .ci/requirements.txt asks.
+
+    It is kept apart from the Blender and its packages, which stay as they are. Raises `Unavailable`.
     """
+    target = library_directory(name, blender.python_version)
+    if not any(target.glob(f"{name}-*.dist-info")):
+        requirements = (REPO / ".ci" / "requirements.txt").read_text(encoding="utf-8")
+        wanted = re.search(rf"(?m)^{name}\b.*$", requirements)[0]
+        install = [*blender.pip, "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--target", target]
+        # With a version, so that the pip of any Python installs for that of a real Blender.
+        version = ["--only-binary", ":all:", "--python-version", blender.python_version]
+        done = subprocess.run([*install, *version, wanted], check=False)
+        if done.returncode:
+            raise Unavailable(f"{name} could not be installed for {blender.name}")
+    return target
+
+
+def xatlas_library(blender):
+    """A directory with xatlas for the Python of a Blender; None where there cannot be one: why is printed."""
     if not isinstance(blender, BpyModule):
         say("xatlas is left out of the comparison: it is installed for PyPI's bpy only")
         return None
-    target = CACHE / f"xatlas-{blender.key}"
-    if not any(target.glob("xatlas*")):
-        requirements = (REPO / ".ci" / "requirements.txt").read_text(encoding="utf-8")
-        wanted = re.search(r"(?m)^xatlas.*$", requirements)[0]
-        install = [blender.python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps"]
-        done = subprocess.run([*install, "--only-binary", ":all:", "--target", target, wanted], check=False)
-        if done.returncode:
-            say("xatlas is left out of the comparison: it could not be installed")
-            return None
-    return target
+    try:
+        return library(blender, "xatlas")
+    except Unavailable as error:
+        say(f"xatlas is left out of the comparison: {error}")
+        return None
 
 
 def run_with_extension(script, arguments, archive=None, *, peers=False):
@@ -201,8 +228,9 @@ def run_with_extension(script, arguments, archive=None, *, peers=False):
         with Profile(blender) as profile:
             say(f"Installing {archive.name} into a throw-away profile of {blender.name}")
             profile.install(archive)
-            library = xatlas_library(blender) if peers else None
-            environment = {"BLE_XATLAS_LIBRARY": str(library)} if library else {}
+            library(blender, "pillow")  # where pictures.py looks for it
+            xatlas = xatlas_library(blender) if peers else None
+            environment = {"BLE_XATLAS_LIBRARY": str(xatlas)} if xatlas else {}
             return profile.run(SCRIPTS / script, *arguments, environment=environment).returncode
     except Unavailable as error:
         print(f"{Path(sys.argv[0]).stem}: {error}", file=sys.stderr)

@@ -1,10 +1,25 @@
-"""Pictures drawn with NumPy alone: UV layouts coloured by stretch, captions, PNG files."""
+"""Pictures drawn with Pillow: UV layouts coloured by stretch, captions, PNG files. A picture is (h, w, 3) uint8.
 
-import struct
-import zlib
+Blender's Python has no Pillow of its own: launch.py puts one into `.cache/`. Where there is none, importing this module
+raises `ImportError` with a sentence that says what to do.
+"""
+
+import functools
+import sys
 from pathlib import Path
 
+import launch
 import numpy as np
+
+if (_library := launch.library_directory("pillow", f"{sys.version_info[0]}.{sys.version_info[1]}")).is_dir():
+    sys.path.append(str(_library))  # behind the Python's own packages
+try:
+    from PIL import Image, ImageDraw, ImageFont
+except ImportError as _error:
+    raise ImportError(
+        f"pictures are drawn with Pillow, which this Python lacks ({_error}); to install it where it is looked for: "
+        f"{sys.executable} -m pip install --target {_library} pillow"
+    ) from _error
 
 BACKGROUND = np.array([24, 26, 30], np.uint8)
 EMPTY = np.array([44, 47, 53], np.uint8)
@@ -20,63 +35,69 @@ STRETCH_COLOURS = (
     (1.50, (240, 190, 60)),
     (2.00, (220, 70, 50)),
 )
-CHUNK_PIXELS = 4_000_000  # pixels tested at a time, which bounds the memory of the rasteriser
-
-# Five columns by seven rows a glyph, a row in five bits.
-_GLYPHS = {
-    "A": "0e11111f111111", "B": "1e11111e11111e", "C": "0e11101010110e", "D": "1e11111111111e", "E": "1f10101e10101f",
-    "F": "1f10101e101010", "G": "0e11101713110e", "H": "1111111f111111", "I": "0e04040404040e", "J": "0702020202120c",
-    "K": "11121418141211", "L": "1010101010101f", "M": "111b1515111111", "N": "11191519131111", "O": "0e11111111110e",
-    "P": "1e11111e101010", "Q": "0e11111115120d", "R": "1e11111e141211", "S": "0f10100e01011e", "T": "1f040404040404",
-    "U": "1111111111110e", "V": "11111111110a04", "W": "1111111515150a", "X": "11110a040a1111", "Y": "11110a04040404",
-    "Z": "1f01020408101f", "0": "0e11131519110e", "1": "040c040404040e", "2": "0e11010204081f", "3": "1f02040201110e",
-    "4": "02060a121f0202", "5": "1f101e0101110e", "6": "0608101e11110e", "7": "1f010204080808", "8": "0e11110e11110e",
-    "9": "0e11110f01020c", ".": "00000000000c0c", ",": "000000000c0408", ":": "000c0c000c0c00", "-": "0000001f000000",
-    "%": "18190204081303", "(": "02040808080402", ")": "08040202020408", "/": "00010204081000", "°": "06090906000000",
-    "+": "0004041f040400", "=": "00001f001f0000", "<": "02040810080402", ">": "08040201020408", "_": "0000000000001f",
-}  # fmt: skip
+TEXT_SIZE = 16  # pixels
+BORDER_WIDTH = 1.3  # pixels
+SMOOTHING = 3  # a drawing is made so many times as large, then reduced: Pillow draws without smoothing
+LARGEST_DRAWING = 8192  # pixels along a side, which bounds the memory
+CHUNK_PIXELS = 4_000_000  # pixels tested at a time, which bounds the memory
 
 
-def write_png(path, pixels):
-    """Writes (h, w, 3) uint8 as a PNG file, under a temporary name first."""
-    pixels = np.ascontiguousarray(pixels, np.uint8)
-    height, width, _ = pixels.shape
-    plain = np.zeros((height, 1 + 3 * width), np.uint8)  # a filter byte before every row: 0 is none
-    plain[:, 1:] = pixels.reshape(height, -1)
-    differences = plain.copy()
-    differences[:, 0] = 1  # each pixel less the one before it, which suits renderings
-    differences[:, 4:] -= plain[:, 1:-3]
-    body = min((zlib.compress(rows.tobytes(), 9) for rows in (plain, differences)), key=len)
-
-    def chunk(name, data):
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    data = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", body)
+def write_png(path, picture):
+    """Writes a picture as a PNG file, under a temporary name first."""
     path = Path(path)
     work = path.with_name(f".{path.name}.tmp")
-    work.write_bytes(data + chunk(b"IEND", b""))
+    Image.fromarray(np.ascontiguousarray(picture, np.uint8)).save(work, "PNG", optimize=True)
     work.replace(path)
 
 
-def draw_text(canvas, text, x, y, scale=2, colour=TEXT):
-    """Draws a line of text with its upper left corner at (x, y); what does not fit is left out."""
-    for character in text.upper():
-        rows = _GLYPHS.get(character)
-        if rows:
-            for row in range(7):
-                bits = int(rows[2 * row : 2 * row + 2], 16)
-                for column in range(5):
-                    if bits >> (4 - column) & 1:
-                        top, left = y + row * scale, x + column * scale
-                        canvas[top : top + scale, left : left + scale] = colour
-        x += 6 * scale
-    return x
+def read_png(path):
+    """The picture in a file."""
+    with Image.open(path) as image:
+        return np.array(image.convert("RGB"))
+
+
+@functools.cache
+def _font(size):
+    return ImageFont.load_default(size)
+
+
+def line_height(size=TEXT_SIZE):
+    """Pixels from one line of text to the next."""
+    return round(1.4 * size)
+
+
+def text_width(text, size=TEXT_SIZE):
+    """Pixels that a line of text takes."""
+    return int(np.ceil(_font(size).getlength(text)))
+
+
+def shortened(text, width, size=TEXT_SIZE):
+    """The text, or as much of its beginning as fits into a width, with dots after it."""
+    if text_width(text, size) <= width:
+        return text
+    while text and text_width(f"{text}...", size) > width:
+        text = text[:-1]
+    return f"{text}..." if text else ""
+
+
+def draw_text(canvas, text, x, y, size=TEXT_SIZE):
+    """Draws a line of text with its upper left corner at (x, y), as far as there is room; returns where it ends."""
+    image = Image.fromarray(canvas)
+    ImageDraw.Draw(image).text((x, y), text, font=_font(size), fill=tuple(TEXT.tolist()))
+    canvas[:] = np.asarray(image)
+    return x + text_width(text, size)
+
+
+def plain(height, width, colour=BACKGROUND):
+    """A picture of one colour."""
+    canvas = np.empty((height, width, 3), np.uint8)
+    canvas[:] = colour
+    return canvas
 
 
 def side_by_side(pictures, gap=16):
     """Pictures of equal height in a row."""
-    bar = np.broadcast_to(BACKGROUND, (pictures[0].shape[0], gap, 3))
+    bar = plain(pictures[0].shape[0], gap)
     parts = [bar]
     for picture in pictures:
         parts += [picture, bar]
@@ -88,13 +109,11 @@ def stacked(pictures):
     return np.concatenate(pictures)
 
 
-def with_captions(picture, captions, scale=2):
+def with_captions(picture, captions, size=TEXT_SIZE):
     """A picture below lines of text."""
-    line = 10 * scale
-    head = np.empty((line * len(captions) + 6, picture.shape[1], 3), np.uint8)
-    head[:] = BACKGROUND
+    head = plain(line_height(size) * len(captions) + 8, picture.shape[1])
     for number, text in enumerate(captions):
-        draw_text(head, text, 2, 4 + number * line, scale)
+        draw_text(head, shortened(text, head.shape[1] - 2, size), 2, 4 + number * line_height(size), size)
     return np.concatenate([head, picture])
 
 
@@ -104,50 +123,70 @@ def layout(selection, uv, size=900):
     points = uv.astype(np.float64) * size
     points[:, 1] = size - points[:, 1]
     colours = _face_colours(*_stretch(selection, uv, triangles))
-    canvas = np.empty((size, size, 3), np.uint8)
-    canvas[:] = EMPTY
-    count = np.zeros((size, size), np.uint8)
-    for index, rows, columns in _covered_pixels(points[triangles], size):
-        canvas[rows, columns] = colours[index]
-        np.add.at(count, (rows, columns), 1)
-    canvas[count > 1] = OVERLAP
-    rows, columns = _line_pixels(points, _border_edges(selection, uv), size)
-    canvas[rows, columns] = BORDER
-    return canvas
+    drawing = _Drawing(size)
+    for corners, colour in zip(points[triangles], colours.tolist(), strict=True):
+        drawing.polygon(corners, colour)
+    drawing.paint(_coverage(points[triangles], size) > 1, OVERLAP)
+    for ends in points[_border_edges(selection, uv)]:
+        drawing.line(ends, BORDER.tolist(), BORDER_WIDTH)
+    return drawing.picture()
 
 
 def point_layout(uv, colours, size=900):
     """The UVs of points as (size, size, 3): a dot each in its colour, (n, 3) in 0..1."""
-    canvas = np.empty((size, size, 3), np.uint8)
-    canvas[:] = EMPTY
     inside = np.isfinite(uv).all(axis=1)
-    uv, colours = uv[inside].astype(np.float64), (np.clip(colours[inside], 0, 1) * 255 + 0.5).astype(np.uint8)
-    radius = max(1.0, 0.6 * size / np.sqrt(max(len(uv), 1)))
-    reach = int(np.ceil(radius))
-    column, row = np.floor(uv[:, 0] * size).astype(np.int64), np.floor((1 - uv[:, 1]) * size).astype(np.int64)
-    for down in range(-reach, reach + 1):
-        for across in range(-reach, reach + 1):
-            if across * across + down * down > radius * radius:
-                continue
-            x, y = column + across, row + down
-            fits = (x >= 0) & (x < size) & (y >= 0) & (y < size)
-            canvas[y[fits], x[fits]] = colours[fits]
-    return canvas
+    points, colours = (
+        uv[inside].astype(np.float64) * size,
+        (np.clip(colours[inside], 0, 1) * 255 + 0.5).astype(np.uint8),
+    )
+    points[:, 1] = size - points[:, 1]
+    radius = max(1.0, 0.6 * size / np.sqrt(max(len(points), 1)))
+    drawing = _Drawing(size)
+    for point, colour in zip(points, colours.tolist(), strict=True):
+        drawing.dot(point, radius, colour)
+    return drawing.picture()
 
 
-def legend(width, height=22):
+def legend(width, height=26):
     """The scale of stretch colours as a strip; of a narrow one the right end is cut off."""
-    strip = np.empty((height, max(width, 310), 3), np.uint8)
-    strip[:] = BACKGROUND
-    values = np.linspace(1.0, 2.0, 200)
-    strip[4 : height - 4, 110:310] = _ramp(values)
-    draw_text(strip, "STRETCH 1", 2, 5, 2)
-    end = draw_text(strip, "2", 318, 5, 2)
-    strip[4 : height - 4, end + 30 : end + 50] = FLIP
-    end = draw_text(strip, "FLIPPED", end + 58, 5, 2)
-    strip[4 : height - 4, end + 30 : end + 50] = OVERLAP
-    draw_text(strip, "OVERLAP", end + 58, 5, 2)
+    top, room = 4, height - 8
+    strip = plain(height, max(width, 700))
+    x = draw_text(strip, "stretch 1", 4, 3) + 8
+    strip[top : top + room, x : x + 200] = _ramp(np.linspace(1.0, 2.0, 200))
+    x = draw_text(strip, "2", x + 208, 3) + 30
+    for colour, word in ((FLIP, "flipped"), (OVERLAP, "overlap")):
+        strip[top : top + room, x : x + 20] = colour
+        x = draw_text(strip, word, x + 28, 3) + 30
     return strip[:, :width]
+
+
+class _Drawing:
+    """A square canvas that is drawn upon larger than it is asked for, in pixels of what is asked for."""
+
+    def __init__(self, size):
+        self._times = max(1, min(SMOOTHING, LARGEST_DRAWING // size))
+        self._image = Image.new("RGB", (size * self._times,) * 2, tuple(EMPTY.tolist()))
+        self._draw = ImageDraw.Draw(self._image)
+
+    def _at(self, points):
+        return (points * self._times - 0.5).ravel().tolist()
+
+    def polygon(self, corners, colour):
+        self._draw.polygon(self._at(corners), fill=tuple(colour))
+
+    def line(self, ends, colour, width):
+        self._draw.line(self._at(ends), fill=tuple(colour), width=max(1, round(width * self._times)))
+
+    def dot(self, centre, radius, colour):
+        self._draw.ellipse(self._at(np.array([centre - radius, centre + radius])), fill=tuple(colour))
+
+    def paint(self, chosen, colour):
+        """Colours whole pixels, (size, size) bool."""
+        mask = Image.fromarray(chosen.astype(np.uint8) * 255).resize(self._image.size, Image.Resampling.NEAREST)
+        self._image.paste(tuple(colour.tolist()), mask=mask)
+
+    def picture(self):
+        return np.array(self._image.reduce(self._times))
 
 
 def corner_triangles(selection):
@@ -185,13 +224,17 @@ def _face_colours(stretch, flipped):
     return colours
 
 
-def _covered_pixels(corners, size):
-    """Pixels whose centre lies in a triangle, in portions: (triangle index, rows, columns)."""
+def _coverage(corners, size):
+    """How many triangles, (t, 3, 2), cover the centre of each pixel, (size, size).
+
+    By hand, since neither Pillow nor Matplotlib counts: they fill shared sides twice, or blend what lies above.
+    """
+    count = np.zeros((size, size), np.int32)
     low = np.floor(np.clip(corners.min(axis=1), 0, size)).astype(np.int64)
     high = np.ceil(np.clip(corners.max(axis=1), 0, size)).astype(np.int64)
     extent = np.maximum((high - low).max(axis=1), 1)
     side_class = np.ceil(np.log2(extent)).astype(int)
-    for power in np.unique(side_class):
+    for power in np.unique(side_class):  # triangles of about the same size at once
         side = 1 << int(power)
         members = np.flatnonzero(side_class == power)
         step = max(1, CHUNK_PIXELS // (side * side))
@@ -209,7 +252,8 @@ def _covered_pixels(corners, size):
             which, row, column = np.nonzero(inside_left | inside_right)
             rows, columns = low[index[which], 1] + row, low[index[which], 0] + column
             fits = (rows < size) & (columns < size)
-            yield index[which][fits], rows[fits], columns[fits]
+            np.add.at(count, (rows[fits], columns[fits]), 1)
+    return count
 
 
 def _border_edges(selection, uv):
@@ -217,8 +261,9 @@ def _border_edges(selection, uv):
     corners = len(selection.corner_vertices)
     following = np.arange(1, corners + 1)
     following[selection.face_offsets[1:] - 1] = selection.face_offsets[:-1]
+    _, place = np.unique(selection.positions, axis=0, return_inverse=True)  # files split vertices at every face
     key = np.empty((corners, 3), np.int64)
-    key[:, 0] = selection.corner_vertices
+    key[:, 0] = place.reshape(-1)[selection.corner_vertices]
     key[:, 1:] = np.ascontiguousarray(uv, np.float32).view(np.int32)
     _, point = np.unique(key, axis=0, return_inverse=True)
     point = point.reshape(-1)
@@ -226,15 +271,3 @@ def _border_edges(selection, uv):
     _, first, uses = np.unique(ends, axis=0, return_index=True, return_counts=True)
     first = first[uses == 1]
     return np.stack([first, following[first]], axis=1)
-
-
-def _line_pixels(points, edges, size):
-    """Pixels along line segments."""
-    start, end = points[edges[:, 0]], points[edges[:, 1]]
-    steps = np.clip(np.ceil(np.abs(end - start).max(axis=1)).astype(int) + 1, 2, 2 * size)
-    index = np.repeat(np.arange(len(edges)), steps)
-    position = np.arange(len(index)) - np.repeat(np.cumsum(steps) - steps, steps)
-    share = (position / (steps[index] - 1))[:, None]
-    pixel = np.floor(start[index] * (1 - share) + end[index] * share).astype(np.int64)
-    pixel = pixel[((pixel >= 0) & (pixel < size)).all(axis=1)]
-    return pixel[:, 1], pixel[:, 0]

@@ -127,21 +127,6 @@ def place_lights(scene, camera):
     return key, world
 
 
-def taken(path):
-    """The pixels of a picture file as (h, w, 3) uint8; the file is removed."""
-    import bpy
-    import numpy as np
-
-    image = bpy.data.images.load(str(path))
-    image.colorspace_settings.name = "Non-Color"  # the values as they are in the file
-    pixels = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
-    image.pixels.foreach_get(pixels)
-    pixels = pixels.reshape(image.size[1], image.size[0], image.channels)[::-1, :, :3]
-    bpy.data.images.remove(image)
-    Path(path).unlink()
-    return (pixels * 255 + 0.5).astype(np.uint8)
-
-
 def render_objects(objects, path, uv_map, *, size=(960, 720), samples=32, cells=16, plain=False, view=None):
     """Renders objects through a UV map to a PNG file. Their materials and other objects' visibility are put back.
 
@@ -228,13 +213,15 @@ def has_map(obj, name):
 
 def main(argv):
     batch, asset_io = addon_loader.load("batch"), addon_loader.load("asset_io")
-    parser = argparse.ArgumentParser(prog="render.py", description="A model with a numbered colour grid on its UVs.")
-    parser.add_argument("input", metavar="IN")
-    parser.add_argument("-o", "--output", required=True, metavar="PICTURE.png")
+    parser = argparse.ArgumentParser(
+        prog="render.py", description="Render a model with a numbered colour grid as its texture."
+    )
+    parser.add_argument("input", metavar="IN", help="a file with UVs")
+    parser.add_argument("-o", "--output", required=True, metavar="PICTURE.png", help="the picture to write")
     parser.add_argument("--uv-map", help="UV map to show (default: the active one)")
-    parser.add_argument("--size", type=int, nargs=2, default=(960, 720), metavar=("WIDTH", "HEIGHT"))
+    parser.add_argument("--size", type=int, nargs=2, default=(960, 720), metavar=("WIDTH", "HEIGHT"), help="in pixels")
     parser.add_argument("--samples", type=int, default=32, help="light paths a pixel (default: 32)")
-    parser.add_argument("--cells", type=int, default=16, help="cells along a side of the grid (default: 16)")
+    parser.add_argument("--cells", type=int, default=16, help="cells along each side of the grid (default: 16)")
     options = parser.parse_args(argv)
     if not all(16 <= side <= 8192 for side in options.size) or not 1 <= options.samples <= 4096:
         parser.error("--size must be within 16 and 8192, --samples within 1 and 4096")

@@ -4,7 +4,7 @@ blender -b -P blender_scripts/unwrap.py -- IN... -o OUT [--report report.json] [
 python blender_scripts/unwrap.py IN... -o OUT [--report report.json] [settings]
 
 `--help` lists formats and settings; exit codes: 0 all fine, 1 some assets failed, 2 usage, 3 environment,
-4 a certificate does not hold, 5 stopped by a signal.
+4 a result is not as promised, 5 stopped by a signal.
 """
 
 import sys

@@ -1,5 +1,7 @@
 """The claims of native/paper, on small generated surfaces and by the code that `make paper` runs."""
 
+import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -11,7 +13,10 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "native/paper"))
 
+import commit  # noqa: E402
 import compare  # noqa: E402
+import page  # noqa: E402
+import publish  # noqa: E402
 import shapes  # noqa: E402
 
 CAMELHEAD = ROOT.parent / "shared/models/camelhead.obj"
@@ -90,7 +95,7 @@ def test_the_tables_say_what_was_measured(rows):
     assert table[2].startswith("| face (484 vertices) | BLE (default) | 0 | 1.0")
     groups = {"face": [row for row in rows if row.patch == "face"]}
     charts = compare.chart_table(groups).splitlines()
-    assert len(charts) == 5 and charts[2].startswith("| face (1 charts, 484 vertices) | BLE (default) | 0 | 1 of 1 |")
+    assert len(charts) == 5 and charts[2].startswith("| face (1 chart, 484 vertices) | BLE (default) | 0 | 1 of 1 |")
 
 
 def test_trimmed_stretch():
@@ -165,3 +170,91 @@ def test_the_real_camel_head():
         # Both near 1, and by turns the nearer one: the stretch is what tells them apart.
         assert default.report["distance_correlation_before"] >= isomap.report["distance_correlation_before"] - 1e-3
         assert default.report["flips_after"] == 0 == isomap.report["flips_after"]
+
+
+# The page -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def repository(tmp_path):
+    """A git repository with one commit of one file."""
+
+    def git(*arguments):
+        identity = ["-c", "user.name=a", "-c", "user.email=a@example.org", "-c", "commit.gpgsign=false"]
+        subprocess.run(["git", "-C", str(tmp_path), *identity, *arguments], check=True, capture_output=True)
+
+    git("init", "--quiet")
+    (tmp_path / "file").write_text("a")
+    git("add", "file")
+    git("commit", "--quiet", "-m", "One", "--date", "2020-02-03T04:05:06")
+    return tmp_path
+
+
+def test_the_commit_is_named_with_its_date(repository):
+    assert re.fullmatch(r"commit [0-9a-f]{7,} \(\d{4}-\d\d-\d\d\)", commit.described(repository))
+    assert commit.is_clean(repository)
+    (repository / "other").write_text("git does not know it")
+    assert commit.is_clean(repository)
+
+
+def test_changes_are_named_as_well(repository):
+    (repository / "file").write_text("b")
+    assert not commit.is_clean(repository)
+    assert commit.described(repository).endswith("with changes that are not committed")
+
+
+def test_outside_a_repository(tmp_path, monkeypatch):
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
+    assert commit.described(tmp_path) == "files that are in no git repository"
+    assert not commit.is_clean(tmp_path)
+
+
+def test_the_page_says_what_it_was_measured_on():
+    head = page._head("commit 0123abc (2020-02-03)", "2 cores of a machine", [])
+    assert "Measured with commit 0123abc (2020-02-03) on 2 cores of a machine." in head
+
+
+@pytest.mark.parametrize(("last", "said"), [(0.1, "linearly"), (0.2, "in this run faster than linearly")])
+def test_the_page_calls_linear_what_was(last, said):
+    text = page._scaling([(10_000, 0.0, 0.01), (100_000, 0.0, last)], [])
+    assert f"of their number: {said}, at a fixed number" in text
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"clean": False}, "commit your changes"),
+        ({"models": ["a.obj"]}, "leave out your own"),
+        ({"quick": True}, "--quick"),
+        ({"rendered": False}, "--no-render"),
+    ],
+)
+def test_what_cannot_become_the_page(wrong, said):
+    good = {"clean": True, "models": [], "quick": False, "rendered": True}
+    assert publish.refusal(**good) is None
+    assert said in publish.refusal(**{**good, **wrong})
+
+
+def test_publishing_replaces_page_and_pictures(tmp_path):
+    measured, here = tmp_path / "out", tmp_path / "page"
+    for directory, names in ((measured, ("new", "both")), (here, ("old", "both"))):
+        (directory / "pictures").mkdir(parents=True)
+        (directory / "README.md").write_text(f"of {directory.name}")
+        for name in names:
+            (directory / "pictures" / f"{name}.png").write_text(f"{name} of {directory.name}")
+    (here / "map.md").write_text("stays")
+    publish.publish(measured, here)
+    assert {p.name: p.read_text() for p in (here / "pictures").iterdir()} == {
+        "new.png": "new of out",
+        "both.png": "both of out",
+    }
+    assert (here / "README.md").read_text() == "of out" and (here / "map.md").read_text() == "stays"
+
+
+def test_publishing_is_refused_before_anything_is_measured(tmp_path):
+    """`--publish` with what cannot become the page ends at once, with a sentence and the exit code of wrong usage."""
+    pytest.importorskip("matplotlib")
+    command = [sys.executable, str(ROOT / "native/paper/make.py"), "--quick", "--publish", "-o", str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and "leave out --quick" in done.stderr
+    assert not (tmp_path / "out").exists()

@@ -2,7 +2,7 @@
 
 A `.blend` keeps everything: modifiers, links, texts; its base meshes are unwrapped, wherever in the file they are. The
 other formats hold what modifiers make, so those are applied first, and it is the result that is unwrapped, certified
-and written. Where that would lose shape keys, the modifiers are left off instead.
+and written. Where that would lose shape keys, the modifiers are not applied.
 """
 
 from collections import defaultdict
@@ -84,14 +84,14 @@ def _keep_all(kind, shapes):
     remade.pop((), None)
     for names, of in remade.items():
         contents.notes.append(
-            f"{listed(of)}: the certificate is about the mesh without {named('modifier', names)}: kept, but what "
-            "is made of the mesh there has other faces or UVs; apply first to have that unwrapped"
+            f"{listed(of)}: the mesh was unwrapped without {named('modifier', names)}, and nothing is promised of the "
+            "faces and UVs made there; to have these unwrapped, apply modifiers first"
         )
     _place(objects)
     used = {obj.data for obj in bpy.data.objects if obj.type == "MESH"}
     unused = [mesh.name for mesh in bpy.data.meshes if mesh.users and mesh.polygons and mesh not in used]
     if unused:
-        contents.notes.append(f"{listed(unused)}: meshes of no object, which were left as they are")
+        contents.notes.append(f"{listed(unused)}: no object uses these meshes, so they were left as they are")
     return contents
 
 
@@ -130,7 +130,7 @@ def _flatten(kind, shapes):
     left = sorted(obj.name for obj in everything - set(found) - shapes)
     if left:
         contents.notes.append(
-            f"{listed(left)}: not in the .{kind} file, since hidden, in an excluded collection or in another scene"
+            f"{listed(left)}: not in the .{kind} file, because hidden, in an excluded collection or in another scene"
         )
     contents.objects = [obj for obj in found if obj.type in targets.TYPES and obj.data.is_editable]
     _place(contents.objects)
@@ -149,13 +149,16 @@ def _apply(objects, kind, notes):
     applied, left = [], []
     off = _grouped((tuple(m.name for m in modifiers.off_in_viewport(obj)), obj.name) for obj in objects)
     off.pop((), None)
-    notes += [f"{listed(of)}: {named('modifier', names)} left off, as in the viewport" for names, of in off.items()]
+    notes += [
+        f"{listed(of)}: {named('modifier', names)} not applied, since turned off in the viewport"
+        for names, of in off.items()
+    ]
     for obj in objects:
         if modifiers.to_apply(obj, keeps_pose) or (obj.data.shape_keys and not keeps_pose):
             (left if keeps_pose and obj.data.shape_keys else applied).append(obj)
     kept_off = _grouped((tuple(m.name for m in modifiers.to_apply(obj, keeps_pose)), obj.name) for obj in left)
     for names, of in kept_off.items():
-        notes.append(f"{listed(of)}: {named('modifier', names)} left off: applied, the shape keys would be lost")
+        notes.append(f"{listed(of)}: {named('modifier', names)} not applied, since the shape keys would be lost")
     for obj in left:
         for modifier in modifiers.to_apply(obj, keeps_pose):
             obj.modifiers.remove(modifier)

@@ -25,6 +25,11 @@ def file_format(path):
     return Path(path).suffix.lower().lstrip(".")
 
 
+def default_settings(path):
+    """The settings whose defaults depend on the format of the file that meshes come from."""
+    return {"weld": file_format(path) in SPLIT_FORMATS}
+
+
 def default_output_format(path):
     return DEFAULT_OUTPUT.get(file_format(path), file_format(path))
 

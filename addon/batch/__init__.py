@@ -2,7 +2,7 @@
 
 `main(argv) -> exit code` never raises for what a user can cause. Codes: 0 all assets are fine; 1 some failed (the
 others are written, the report says why); 2 wrong usage; 3 Blender or the native library is missing; 4 all were
-written but a certificate does not hold; 5 a signal stopped it (what was done is written and in the report).
+written, but one is not as promised; 5 a signal stopped it (what was done is written and in the report).
 """
 
 # ruff: noqa: T201  (the command line talks through print)
@@ -95,7 +95,7 @@ def process_all(plan, settings, arguments, earlier, report, stop):
             stop.check()
             before = earlier.get((str(planned.source), str(planned.target)))
             if arguments.resume and before and not planned.problem and evidence.is_done(planned, before):
-                asset, text = before, "done before"
+                asset, text = before, "done already, skipped"
             else:
                 asset = process(planned, settings, arguments, evidence, stop)
                 text = asset["error"] or f"{asset['summary']} -> {planned.target}"
@@ -119,8 +119,7 @@ def process(planned, settings, arguments, evidence, stop):
     try:
         if planned.problem:
             raise asset_io.AssetError(planned.problem)
-        # These formats split vertices wherever normals or UVs differ.
-        settings = {"weld": asset_io.file_format(source) in asset_io.SPLIT_FORMATS, **settings}
+        settings = {**asset_io.default_settings(source), **settings}
         asset_io.load(source)
         external = resume.external_files()
         contents = asset_io.prepare(target)
@@ -165,10 +164,12 @@ def unwrapped_objects(objects, target):
         return surfaces + clouds, []
     if not surfaces:
         if kind == "ply":
-            raise mesh_bridge.MeshError("holds several clouds, and a .ply file keeps one: use --format blend")
+            raise mesh_bridge.MeshError(
+                "holds several point clouds, and a .ply file can store only one: use --format blend"
+            )
         able = " or ".join(asset_io.POINT_FORMATS)
-        raise mesh_bridge.MeshError(f"holds points, whose UVs .{kind} files cannot keep: use --format {able}")
-    return surfaces, [f"{obj.name}: left out, .{kind} files cannot keep UVs of its points" for obj in clouds]
+        raise mesh_bridge.MeshError(f"holds points, and .{kind} files cannot store UVs of points: use --format {able}")
+    return surfaces, [f"{obj.name}: left out, because .{kind} files cannot store UVs of points" for obj in clouds]
 
 
 def written_cloud(run, outcomes):

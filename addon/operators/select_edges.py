@@ -27,7 +27,7 @@ class MESH_OT_ble_unwrap_select_edges(bpy.types.Operator):
         visible = [obj for obj in last_result.objects(context) if obj.type == "MESH" and obj.visible_get()]
         found = {obj: shown for obj in visible if (shown := visible_crowded_edges(obj.data)).size}
         if not found:
-            self.report({"WARNING"}, "Nothing that is visible has an edge with more than two faces")
+            self.report({"WARNING"}, "No visible edge of these meshes has more than two faces")
             return {"CANCELLED"}
         for obj in context.view_layer.objects:
             obj.select_set(obj in found)

@@ -3,7 +3,7 @@
 import bpy
 from bpy.props import BoolProperty
 
-from .. import engine, faces, last_result, mesh_bridge, preferences, properties, targets
+from .. import engine, faces, kept_analysis, last_result, mesh_bridge, preferences, properties, targets
 from ..panel import panel_settings
 from ..run import Run
 
@@ -31,8 +31,8 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
     bl_idname = "uv.ble_unwrap"
     bl_label = "BLE Unwrap"
     bl_description = (
-        "Cut, flatten and pack meshes and point clouds so that no chart is stretched beyond a limit, "
-        "without overlaps or flips"
+        "Cut meshes into charts (UV islands), flatten and pack them, so that none is stretched beyond a limit, "
+        "overlaps or is flipped. Point clouds get UVs, too"
     )
     bl_options = {"REGISTER", "UNDO"}
 
@@ -168,7 +168,7 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
                 self.report({"INFO"}, f"BLE Unwrap:{name} {outcome.summary}")
             else:
                 broken = "; ".join(outcome.certificate.violations)
-                self.report({"WARNING"}, f"BLE Unwrap:{name} {outcome.summary}. Not kept: {broken}")
+                self.report({"WARNING"}, f"BLE Unwrap:{name} {outcome.summary}. Not as promised: {broken}")
         redraw(context)
         return {"FINISHED"}
 
@@ -203,7 +203,7 @@ def redraw(context):
 @bpy.app.handlers.persistent
 def forget(*_):
     """Frees the analysis kept for the redo panel: another file is loaded."""
-    engine.forget()
+    kept_analysis.forget()
 
 
 def register():
@@ -213,5 +213,5 @@ def register():
 
 def unregister():
     bpy.app.handlers.load_post.remove(forget)
-    engine.forget()
+    kept_analysis.forget()
     bpy.utils.unregister_class(UV_OT_ble_unwrap)

@@ -140,6 +140,10 @@ def patch_table(rows):
     return "\n".join(lines)
 
 
+def charts_text(count):
+    return "1 chart" if count == 1 else f"{count} charts"
+
+
 def chart_table(groups):
     """Rows of the charts of each model, added up: {model: rows}."""
     lines = [
@@ -155,7 +159,9 @@ def chart_table(groups):
             def mean(values, weight=vertices):
                 return float((np.array(values) * weight).sum() / weight.sum())
 
-            title = f"{model} ({len(mine)} charts, {int(vertices.sum()):,} vertices)" if mine[0] is rows[0] else ""
+            title = (
+                f"{model} ({charts_text(len(mine))}, {int(vertices.sum()):,} vertices)" if mine[0] is rows[0] else ""
+            )
             lines.append(
                 f"| {title} | {name} | {sum(row.report['flips_before'] for row in mine)} |"
                 f" {sum(row.report['flips_before'] == 0 for row in mine)} of {len(mine)} |"

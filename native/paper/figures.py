@@ -195,7 +195,7 @@ def figure_3(models, path):
         show(line[0], pictures["checker"])
         line[0].set_title(f"{mesh.name}, {report['faces']:,} faces")
         show(line[1], pictures["charts"])
-        charts = "1 chart" if report["charts"] == 1 else f"{report['charts']} charts"
+        charts = compare.charts_text(report["charts"])
         line[1].set_title(f"{charts}, L2 {report['l2']:.3f}, worst {report['l2_worst_chart']:.3f}")
         axes = line[2]
         shapes = np.split(uv, mesh.face_offsets[1:-1])

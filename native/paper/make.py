@@ -1,18 +1,17 @@
 """`make paper`: the paper's figures and comparisons, measured and drawn anew.
 
-python native/paper/make.py [MODEL.obj ...] [-o out/paper] [--no-render] [--quick]
+python native/paper/make.py [MODEL.obj ...] [-o out/paper] [--no-render] [--quick] [--publish]
 
-Writes tables (Markdown and JSON) and pictures to the output directory, and refreshes the page and the pictures beside
-this file. Models given by path take the place of the generated ones in figure 3 and in the table of charts; then the
-page here is left alone. Needs the wheel, matplotlib and scikit-learn, and for the renders a Blender or its Python
-package.
+Writes the page (README.md), its pictures and its table as JSON to the output directory, and nothing elsewhere; with
+`--publish`, which is what `make paper-page` does, the page beside this file is brought up to date afterwards. Models
+given by path take the place of the generated ones in figure 3 and in the table of charts. Needs the wheel, matplotlib
+and scikit-learn, and for the renders a Blender or its Python package.
 """
 
 # ruff: noqa: E402
 
 import argparse
 import json
-import shutil
 import subprocess
 import sys
 import time
@@ -23,6 +22,7 @@ REPO = HERE.parent.parent
 sys.path[:0] = [str(HERE), str(REPO / "blender_scripts")]
 
 import ble_unwrap_native as ble
+import commit
 import compare
 import figures
 import launch
@@ -30,6 +30,7 @@ import machine
 import measure
 import numpy as np
 import page
+import publish
 import shapes
 
 RUNS = 7  # of an embedding whose time is given: the best counts
@@ -103,7 +104,7 @@ def atlases(models, renders):
     found = []
     for mesh in models:
         atlas = ble.unwrap(*mesh.arrays, texture_size=1024)
-        say(f"{mesh.name}: {atlas.report['faces']:,} faces, {atlas.report['charts']} charts")
+        say(f"{mesh.name}: {atlas.report['faces']:,} faces, {compare.charts_text(atlas.report['charts'])}")
         uv, chart = np.asarray(atlas.uv), np.asarray(atlas.chart)
         name = mesh.name.replace(" ", "_")
         pictures = {
@@ -122,20 +123,28 @@ def variants(models):
             begin = time.perf_counter()
             report = ble.unwrap(*mesh.arrays, preset=preset, texture_size=1024, margin=2).report
             rows.append((mesh.name, preset, dict(report), time.perf_counter() - begin))
-            say(f"{mesh.name}, preset {preset}: {report['charts']} charts in {rows[-1][-1]:.0f} s")
+            say(f"{mesh.name}, preset {preset}: {compare.charts_text(report['charts'])} in {rows[-1][-1]:.0f} s")
     return rows
 
 
 def main():
     parser = argparse.ArgumentParser(prog="make.py", description="The paper's figures and comparisons.")
-    parser.add_argument("models", nargs="*", metavar="MODEL.obj", help="your own instead of the generated ones")
-    parser.add_argument("-o", "--output", default=REPO / "out" / "paper", type=Path)
-    parser.add_argument("--render", action=argparse.BooleanOptionalAction, default=True)
+    parser.add_argument(
+        "models", nargs="*", metavar="MODEL.obj", help="models of your own instead of the generated ones"
+    )
+    parser.add_argument("-o", "--output", default=REPO / "out" / "paper", type=Path, help="(default: out/paper)")
+    parser.add_argument("--render", action=argparse.BooleanOptionalAction, default=True, help="(default: yes)")
     parser.add_argument("--quick", action="store_true", help="small sizes and no presets: to try the script")
+    parser.add_argument("--publish", action="store_true", help="bring the page in native/paper up to date afterwards")
     options = parser.parse_args()
     for path in options.models:
         if not Path(path).is_file():
             parser.error(f"{path}: no such file")
+    code, clean = commit.described(REPO), commit.is_clean(REPO)
+    if options.publish:
+        given = {"models": options.models, "quick": options.quick, "rendered": options.render}
+        if reason := publish.refusal(clean=clean, **given):
+            parser.error(reason)
     out = options.output.resolve()
     pictures = out / "pictures"
     renders = Renders(out / "renders", options.render)
@@ -146,7 +155,10 @@ def main():
     figures.figure_2a(face, faces, pictures / "figure_2a.png")
     say("figure 3: atlases")
     made = atlases(models, renders)
-    if renders.run():
+    rendered = renders.run()
+    if options.publish and not rendered:
+        raise SystemExit("The page needs the renders, and there is no Blender to make them")
+    if rendered:
         figures.figure_2b(head, heads, textured, pictures / "figure_2b.png")
         figures.figure_3(made, pictures / "figure_3.png")
     say("the table: three methods on the same patches")
@@ -163,9 +175,10 @@ def main():
     say("trustworthiness")
     trust = measure.trustworthiness_table(400 if options.quick else 1500)
     text = page.text(
+        code=code,
         machine=machine.described(),
         models=[Path(path).name for path in options.models],
-        rendered=(pictures / "figure_3.png").is_file(),
+        rendered=rendered,
         faces=faces,
         landmarks=compare.flatten(face, "by landmarks", {}, RUNS).report,
         heads=heads,
@@ -184,12 +197,9 @@ def main():
         for row in [*patches, *(row for group in charts.values() for row in group)]
     ]
     (out / "table.json").write_text(json.dumps(rows, indent=1), encoding="utf-8")
-    if not options.models and not options.quick:
-        (HERE / "README.md").write_text(text, encoding="utf-8")
-        (HERE / "pictures").mkdir(exist_ok=True)
-        for picture in pictures.glob("*.png"):
-            shutil.copy2(picture, HERE / "pictures" / picture.name)
-        say(f"refreshed native/paper ({figures.total_size(HERE / 'pictures') / 1e6:.2f} MB of pictures)")
+    if options.publish:
+        publish.publish(out, HERE)
+        say(f"brought native/paper up to date ({figures.total_size(HERE / 'pictures') / 1e6:.2f} MB of pictures)")
     print(compare.patch_table(patches), compare.chart_table(charts), f"written to {out}", sep="\n\n")
     return 0
 

@@ -41,6 +41,7 @@ def run_tests(blender, archive, library, extra):
     """Runs the tests in one Blender; counts by outcome, or None where pytest did not get to its end."""
     with launch.Profile(blender) as profile:
         profile.install(archive)
+        launch.library(blender, "pillow")  # where pictures.py looks for it
         results = profile.home / "junit.xml"
         profile.run(
             HERE / "inside.py",

@@ -246,11 +246,11 @@ def test_overlap_with_faces_that_were_kept_is_told(addon):
     unwrap()
     edit(obj, faces=list(range(12)))
     unwrap()
-    told = [text for text in warnings() if text.startswith("New charts lie on faces that were kept")]
+    told = [text for text in warnings() if text.startswith("New charts overlap faces that were not unwrapped")]
     summary = next(text for _, text in lines() if "overlap" in text)
     bpy.ops.object.mode_set(mode="OBJECT")
     assert addon("comparison").overlapping_faces([obj]) > 0
-    assert len(told) == 1 and not summary.endswith("none with faces that were kept")
+    assert len(told) == 1 and not summary.endswith("none with faces that were not unwrapped")
     # Shrunk into a corner and unwrapped in its place, there is none, which is measured, too.
     values = uvs(obj).copy()
     inside = np.repeat(np.arange(36) < 12, 4)
@@ -259,7 +259,7 @@ def test_overlap_with_faces_that_were_kept_is_told(addon):
     set_uvs(obj, values)
     edit(obj, faces=list(range(12)))
     unwrap(use_original_bounds=True)
-    assert ["OK", "0 overlaps, none with faces that were kept"] in lines()
+    assert ["OK", "0 overlaps, none with faces that were not unwrapped"] in lines()
     bpy.ops.object.mode_set(mode="OBJECT")
     assert addon("comparison").overlapping_faces([obj]) == 0
 
@@ -358,7 +358,7 @@ def test_squares_are_square_on_the_image(size):
     textured(obj, size)
     unwrap()
     assert pixel_extent(obj, size) == pytest.approx(1, abs=0.01)  # 2:1 without it: 340 by 679 pixels
-    assert any("proportions of Wood.png" in text for status, text in lines() if status == "INFO")
+    assert any("proportions of the image Wood.png" in text for status, text in lines() if status == "INFO")
     unwrap(correct_aspect=False)
     assert pixel_extent(obj, (1, 1)) == pytest.approx(1, abs=0.01)
 
@@ -386,7 +386,7 @@ def test_the_active_material_decides_and_others_are_mentioned():
     obj.active_material_index = 1
     unwrap()
     assert pixel_extent(obj, (256, 128)) == pytest.approx(1, abs=0.01)
-    assert any("Wide.png; other images have others" in text for _, text in lines())
+    assert any("Wide.png; other images have other proportions" in text for _, text in lines())
 
 
 def test_a_comparison_is_made_at_the_proportions_of_the_image(addon):
@@ -405,7 +405,7 @@ def test_replacing_the_map_of_a_texture_is_told(mapping, uv_map):
     textured(obj, (64, 64), mapping=mapping, uv_map=uv_map)
     unwrap()
     (text,) = warnings()
-    assert text.startswith("Cube: UVMap was replaced, which material Wood uses for Wood.png")
+    assert text.startswith("Cube: the UV map UVMap was replaced, which material Wood uses for the image Wood.png")
     assert ("Mapping node" in text) is mapping
     unwrap(uv_map="NEW", uv_map_name="baked")
     assert not warnings(), "another map: the texture keeps its own"

@@ -111,7 +111,7 @@ def test_whatever_ends_a_batch_what_was_done_is_known(started, run_script, files
     assert 3 <= len(listed) < len(sources)
     done = run_script("unwrap.py", *arguments, "--resume")
     assert done.returncode == 0, done.stdout
-    assert done.stdout.count("done before") == len(listed)
+    assert done.stdout.count("done already") == len(listed)
     report = read_report(tmp_path / "r.json")
     assert report["state"] == "complete" and report["summary"]["ok"] == len(sources)
     assert not (tmp_path / "r.json.journal").exists() and not list(tmp_path.glob(".r.json*"))
@@ -139,7 +139,7 @@ def test_resumed_batch_that_is_stopped_forgets_nothing(addon, batch, files, tmp_
     assert len(report["assets"]) == 0 and len(report["earlier"]) == 4
     monkeypatch.setattr(addon("batch"), "process", process)
     code, text = batch(*arguments)
-    assert code == 0 and text.count("done before") == 3
+    assert code == 0 and text.count("done already") == 3
     assert read_report(tmp_path / "r.json")["earlier"] == []
 
 
@@ -222,11 +222,11 @@ def assert_done_anew(batch, arguments, change, *more):
     arguments = [*arguments, "-o", "out", "--report", "r.json", "--resume"]
     for expected in (False, True):
         code, text = batch(*arguments)
-        assert code == 0 and ("done before" in text) is expected, text
+        assert code == 0 and ("done already" in text) is expected, text
     change()
     for expected in (False, True):
         code, text = batch(*arguments, *more)
-        assert code == 0 and ("done before" in text) is expected, text
+        assert code == 0 and ("done already" in text) is expected, text
 
 
 def nothing():
@@ -353,7 +353,7 @@ def test_report_of_another_make_resumes_nothing(batch, files, tmp_path):
     for text in (json.dumps(old), "[]", "{", json.dumps({"assets": [3, None]}), "\x00"):
         (tmp_path / "r.json").write_text(text)
         code, said = batch(*arguments)
-        assert code == 0 and "done before" not in said
+        assert code == 0 and "done already" not in said
 
 
 # Where results go ----------------------------------------------------------------------------------------------------

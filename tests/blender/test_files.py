@@ -210,7 +210,7 @@ def test_a_blend_keeps_modifiers_and_says_what_is_certified(addon, tmp_path):
     source = save_blend(tmp_path / "a.blend")
     code, asset = process(addon, tmp_path, source, tmp_path / "out")
     assert code == 0, asset
-    assert "Boxes: the certificate is about the mesh without modifiers Mirror and Array" in notes(asset)
+    assert "Boxes: the mesh was unwrapped without modifiers Mirror and Array" in notes(asset)
     assert "Cast" not in notes(asset), "it moves vertices only"
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out/a.blend"))
     assert [m.type for m in bpy.data.objects["Boxes"].modifiers] == ["MIRROR", "ARRAY"]
@@ -240,7 +240,7 @@ def test_shape_keys_and_bones_are_not_lost_to_modifiers(addon, tmp_path, kind):
     if kind in ("obj", "ply"):
         assert triangles == 24 + 24
         return
-    assert "Keyed: modifier Mirror left off: applied, the shape keys would be lost" in notes(asset)
+    assert "Keyed: modifier Mirror not applied, since the shape keys would be lost" in notes(asset)
     assert triangles == 12 + 24
     by_name = {obj.name: obj for obj in bpy.data.objects if obj.type == "MESH"}
     assert [key.name for key in by_name["Keyed"].data.shape_keys.key_blocks][1:] == ["up"]

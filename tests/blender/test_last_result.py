@@ -174,17 +174,17 @@ def test_lengths_have_units(system, scale, size, unit):
 
 
 def test_one_is_singular(addon):
-    engine = addon("engine")
+    report = addon("surface_report")
     measured = {"charts": 1, "faces": 1, "overlaps": 1, "flips": 1, "unmapped_faces": 1, "overlaps_with_kept": 1}
-    certificate = engine.certify(measured, margin=4)
+    certificate = report.certify(measured, margin=4)
     assert certificate.violations == ["1 overlapping pair of faces", "1 flipped face", "1 face without UVs"]
-    texts = [text for _, text in engine.lines(certificate, margin=4, stretch_limit=1.1)]
+    texts = [text for _, text in report.lines(certificate, margin=4, stretch_limit=1.1)]
     assert texts[0] == "1 face in 1 chart"
-    assert "1 overlap, 1 with faces that were kept" in texts and "1 flipped face" in texts
+    assert "1 overlap, 1 with faces that were not unwrapped" in texts and "1 flipped face" in texts
     many = {**measured, "charts": 1200, "faces": 2, "overlaps": 2, "flips": 2, "unmapped_faces": 2}
-    certificate = engine.certify(many, margin=4)
+    certificate = report.certify(many, margin=4)
     assert certificate.violations == ["2 overlapping pairs of faces", "2 flipped faces", "2 faces without UVs"]
-    assert engine.lines(certificate, margin=4, stretch_limit=1.1)[0] == ("INFO", "2 faces in 1,200 charts")
+    assert report.lines(certificate, margin=4, stretch_limit=1.1)[0] == ("INFO", "2 faces in 1,200 charts")
 
 
 def book(name="Book", pages=3):

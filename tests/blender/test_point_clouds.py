@@ -419,7 +419,7 @@ def test_error_in_one_part_leaves_all_untouched(addon, monkeypatch):
     def fail(*_arguments, **_keywords):
         raise engine.EngineError("on purpose")
 
-    monkeypatch.setattr(engine, "unwrap_points", fail)
+    monkeypatch.setattr(addon("computation"), "unwrap_points", fail)
     before = fingerprint(surface)
     refused("Points: on purpose")
     assert fingerprint(surface) == before

@@ -124,7 +124,7 @@ def test_formats_that_keep_no_uvs_of_points(addon, files, tmp_path, capsys, name
         source = files(name)
     batch = addon("batch")
     assert batch.main([str(source), "-o", str(tmp_path / "out")]) == 1
-    assert "files cannot keep: use --format blend or ply" in capsys.readouterr().err
+    assert "files cannot store UVs of points: use --format blend or ply" in capsys.readouterr().err
     assert not list((tmp_path / "out").glob("*"))
     assert batch.main([str(source), "-o", str(tmp_path / "out"), "--format", "ply"]) == 0
     assert len(read_ply(tmp_path / "out/points.ply")["s"]) == 400
@@ -175,9 +175,9 @@ def test_resume_skips_clouds_that_are_done(addon, tmp_path, capsys):
     arguments = [str(source), "-o", str(tmp_path / "out"), "--report", str(tmp_path / "r.json"), "--resume"]
     for expected in (False, True):
         assert batch.main(arguments) == 0
-        assert ("done before" in capsys.readouterr().out) is expected
+        assert ("done already" in capsys.readouterr().out) is expected
     assert batch.main([*arguments, "--neighbours", "9"]) == 0
-    assert "done before" not in capsys.readouterr().out
+    assert "done already" not in capsys.readouterr().out
 
 
 def test_compare_option_measures_meshes_only(addon, files, tmp_path):

@@ -63,14 +63,14 @@ def test_presets_are_those_of_the_native_module(addon, preset):
 
 def test_settings_of_surfaces_are_those_that_clouds_do_not_take(addon):
     """The table in properties.py against the native module, setting by setting."""
-    properties, engine = addon("properties"), addon("engine")
+    properties, engine, computation = (addon(name) for name in ("properties", "engine", "computation"))
     points = np.random.default_rng(0).random((8, 3)).astype(np.float32)
     defaults = properties.default_values()
     for name in properties.annotations():
         if name in properties.BRIDGE_SETTINGS:
             continue
         try:
-            engine.unwrap_points(points, {name: defaults[name]})
+            computation.unwrap_points(points, {name: defaults[name]})
             taken = True
         except engine.EngineError:
             taken = False
@@ -78,15 +78,16 @@ def test_settings_of_surfaces_are_those_that_clouds_do_not_take(addon):
 
 
 def test_neighbours_default_and_range_are_the_native_modules(addon):
-    engine, keywords = addon("engine"), addon("properties").annotations()["neighbours"].keywords
+    engine, computation = addon("engine"), addon("computation")
+    keywords = addon("properties").annotations()["neighbours"].keywords
     points = np.random.default_rng(0).random((40, 3)).astype(np.float32)
-    default = engine.unwrap_points(points, {}).uv
-    assert np.array_equal(engine.unwrap_points(points, {"neighbours": keywords["default"]}).uv, default)
+    default = computation.unwrap_points(points, {}).uv
+    assert np.array_equal(computation.unwrap_points(points, {"neighbours": keywords["default"]}).uv, default)
     for value in (keywords["min"], keywords["max"]):
-        engine.unwrap_points(points, {"neighbours": value})
+        computation.unwrap_points(points, {"neighbours": value})
     for value in (keywords["min"] - 1, keywords["max"] + 1):
         with pytest.raises(engine.EngineError, match="neighbours"):
-            engine.unwrap_points(points, {"neighbours": value})
+            computation.unwrap_points(points, {"neighbours": value})
 
 
 def test_choosing_a_preset_keeps_where_the_result_goes():

@@ -3,32 +3,15 @@
 import importlib.util
 import json
 import os
-import struct
 import sys
-import zlib
 from pathlib import Path
 
 import addon_loader
 import bpy
 import numpy as np
+import pictures
 import pytest
 from scenes import add_mesh, assert_good, cube, grid, sphere, uvs
-
-
-def read_png(path):
-    """(h, w, 3) uint8 of an 8-bit RGB file, by the standard library."""
-    data, position, body = path.read_bytes(), 8, b""
-    assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    while position < len(data):
-        length, kind = struct.unpack(">I4s", data[position : position + 8])
-        if kind == b"IHDR":
-            width, height, depth, colour = struct.unpack(">IIBB", data[position + 8 : position + 18])
-        elif kind == b"IDAT":
-            body += data[position + 8 : position + 8 + length]
-        position += 12 + length
-    assert (depth, colour) == (8, 2)
-    rows = np.frombuffer(zlib.decompress(body), np.uint8).reshape(height, 1 + 3 * width)
-    return rows, (height, width)
 
 
 def test_all_fine_is_0(run_script, files, tmp_path):
@@ -198,9 +181,9 @@ def test_broken_promise_is_4(addon, monkeypatch, files, tmp_path, capsys):
     """A measurement with an overlap fails the asset's certificate; the file is written all the same."""
     cube()
     source = files("a.obj")
-    engine, batch = addon("engine"), addon("batch")
-    measure = engine.measure
-    monkeypatch.setattr(engine, "measure", lambda *args, **kw: {**measure(*args, **kw), "overlaps": 2})
+    measurement, batch = addon("measurement"), addon("batch")
+    measure = measurement.measure
+    monkeypatch.setattr(measurement, "measure", lambda *args, **kw: {**measure(*args, **kw), "overlaps": 2})
     code = batch.main([str(source), "-o", str(tmp_path / "out"), "--report", str(tmp_path / "r.json")])
     assert code == 4
     assert "2 overlapping pairs" in capsys.readouterr().err
@@ -222,13 +205,13 @@ def test_resume_skips_what_is_done(addon, files, tmp_path, capsys):
     batch = addon("batch")
     arguments = [str(source), "-o", str(tmp_path / "out"), "--report", str(tmp_path / "r.json"), "--resume"]
     assert batch.main(arguments) == 0
-    assert "done before" not in capsys.readouterr().out
+    assert "done already" not in capsys.readouterr().out
     written = (tmp_path / "out/a.obj").stat().st_mtime_ns
     assert batch.main(arguments) == 0
-    assert "done before" in capsys.readouterr().out
+    assert "done already" in capsys.readouterr().out
     assert (tmp_path / "out/a.obj").stat().st_mtime_ns == written
     assert batch.main([*arguments, "--seed", "4"]) == 0
-    assert "done before" not in capsys.readouterr().out
+    assert "done already" not in capsys.readouterr().out
 
 
 def test_several_objects_one_atlas_or_one_each(addon, files, tmp_path):
@@ -272,10 +255,22 @@ def test_compare_script(run_script, files, tmp_path):
     assert set(rows) - {"xatlas"} == {"ble_unwrap", "smart_uv_best", "smart_uv_default"}
     assert ("xatlas" in rows) is ("no row by xatlas: xatlas is not installed" not in done.stdout)
     assert "BLE Unwrap" in done.stdout and "Smart UV" in done.stdout
-    rows_of, (height, width) = read_png(tmp_path / "out/ball_layout.png")
-    assert width > 512 and height > 256
-    assert len(np.unique(rows_of[:, 1:].reshape(-1, 3), axis=0)) > 3
+    picture = pictures.read_png(tmp_path / "out/ball_layout.png")
+    assert picture.shape[1] > 512 and picture.shape[0] > 256
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 3
     assert (tmp_path / "out/ball.blend").is_file()
+
+
+def test_scripts_weld_what_a_format_splits(run_script, files, tmp_path):
+    """A .glb has every face of the sphere apart: the charts are those of the mesh all the same."""
+    sphere()
+    source = files("ball.glb")
+    done = run_script("compare.py", source, "-o", "out", "--picture-size", "128", "--no-blend")
+    assert done.returncode == 0, done.stdout
+    assert json.loads((tmp_path / "out/compare.json").read_text())["models"]["ball"]["ble_unwrap"]["charts"] < 10
+    done = run_script("contact_sheet_inside.py", source, "-o", "sheet.png", "--size", "64")
+    assert done.returncode == 0, done.stdout
+    assert json.loads((tmp_path / "sheet.json").read_text())["models"]["ball"]["charts"] < 10
 
 
 XATLAS = """
@@ -323,6 +318,20 @@ def test_compare_script_with_xatlas(run_script, files, tmp_path):
     assert done.returncode == 0 and "no row by xatlas: xatlas failed: RuntimeError: broken" in done.stdout
     report = json.loads((tmp_path / "out/compare.json").read_text())
     assert "xatlas" not in report["models"]["box"] and "broken" in report["left_out"]["box"]
+
+
+def test_compare_script_without_pillow(run_script, files, tmp_path):
+    """All but the picture is written, and a sentence says what to install."""
+    cube()
+    (tmp_path / "none/PIL").mkdir(parents=True)
+    (tmp_path / "none/PIL/__init__.py").write_text("raise ImportError('none here')")
+    arguments = [files("box.blend"), "-o", "out", "--no-blend"]
+    done = run_script("compare.py", *arguments, environment={"PYTHONPATH": str(tmp_path / "none")})
+    if "no pictures" not in done.stdout and not addon_loader.is_module():
+        pytest.skip("a real Blender does not read PYTHONPATH")
+    assert done.returncode == 0, done.stdout
+    assert "no pictures" in done.stdout and "none here" in done.stdout and "pip install" in done.stdout
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["compare.json"]
 
 
 def test_compare_script_names_what_failed(run_script, tmp_path):

@@ -345,37 +345,37 @@ def test_a_limit_over_the_atlas_is_certified_as_such(addon):
         assert all(status in {"OK", "INFO"} for status, _ in lines), lines
     charts = [int(lines[0][1].split(" in ")[1].split()[0]) for lines in (alone, together)]
     assert charts[1] <= charts[0], charts
-    engine = addon("engine")
+    surface_report = addon("surface_report")
     measured = {"l2_worst_chart": 1.2, "l2_chart_scale": 1.05}
-    assert engine.certify(measured, margin=4, stretch_limit=1.1, limit_over="ATLAS").holds
-    assert not engine.certify(measured, margin=4, stretch_limit=1.1).holds
-    broken = engine.certify(measured, margin=4, stretch_limit=1.01, limit_over="ATLAS").violations
+    assert surface_report.certify(measured, margin=4, stretch_limit=1.1, limit_over="ATLAS").holds
+    assert not surface_report.certify(measured, margin=4, stretch_limit=1.1).holds
+    broken = surface_report.certify(measured, margin=4, stretch_limit=1.01, limit_over="ATLAS").violations
     assert broken == ["the atlas has stretch 1.050, limit is 1.01"]
 
 
 def test_the_redo_panel_finds_the_analysis_and_gives_the_same(addon):
-    engine = addon("engine")
+    kept_analysis = addon("kept_analysis")
     obj = sphere()
     results, first = [], None
     for limit in (1.1, 1.02, 1.1):
         unwrap(stretch_limit=limit)
         results.append(uvs(obj).copy())
-        kept = engine._Kept.analysis
+        kept = kept_analysis._Kept.analysis
         assert kept is not None and (first is None or kept is first)
         first = kept
     assert np.array_equal(results[0], results[2]) and not np.array_equal(results[0], results[1])
-    engine.forget()
+    kept_analysis.forget()
     unwrap(stretch_limit=1.02)
-    assert np.array_equal(uvs(obj), results[1]) and engine._Kept.analysis is not first
-    first = engine._Kept.analysis
+    assert np.array_equal(uvs(obj), results[1]) and kept_analysis._Kept.analysis is not first
+    first = kept_analysis._Kept.analysis
     obj.data.vertices[0].co.z += 0.1
     unwrap(stretch_limit=1.02)
-    assert engine._Kept.analysis is not first, "another mesh"
-    first = engine._Kept.analysis
+    assert kept_analysis._Kept.analysis is not first, "another mesh"
+    first = kept_analysis._Kept.analysis
     unwrap(stretch_limit=1.02, weld=True)
-    assert engine._Kept.analysis is not first, "another surface"
+    assert kept_analysis._Kept.analysis is not first, "another surface"
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    assert engine._Kept.analysis is None
+    assert kept_analysis._Kept.analysis is None
 
 
 def triangle_soup(noise):

@@ -1,0 +1,91 @@
+"""Atlases computed at once or on another thread: arrays and settings in, UVs out. Knows nothing of Blender."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import engine, kept_analysis
+
+
+@dataclass
+class Result:
+    """One UV per corner and a chart per face of a mesh, or one of both per point of a cloud; and the native report."""
+
+    uv: np.ndarray  # (c, 2) float32
+    chart: np.ndarray  # (f,) int32; of a point that is in no chart: -1
+    report: dict
+
+
+def _mesh(selection, cut, follow):
+    """The arrays of a mesh, by position and by name. `cut` and `follow` are kinds of marked edges."""
+    return (
+        (selection.positions, selection.corner_vertices, selection.face_offsets),
+        {
+            "corner_triangles": selection.corner_triangles,
+            "seams": selection.marked(cut),
+            "guides": selection.marked(follow),
+        },
+    )
+
+
+def _caller(name, mesh, settings, keep):
+    """A call of the function `name` of the native module, or where the analysis is kept of its method."""
+    settings = engine.native_settings(settings)
+    if keep:
+        welding = {"weld": settings.pop("weld", False), "weld_distance": settings.pop("weld_distance", None)}
+        analysis = kept_analysis.of(*mesh, welding, settings.get("threads", 0))
+        return lambda module: getattr(analysis, name)(**settings)
+    return lambda module: getattr(module, name)(*mesh[0], **mesh[1], **settings)
+
+
+def _result(atlas):
+    return Result(np.asarray(atlas.uv, np.float32), np.asarray(atlas.chart, np.int32), dict(atlas.report))
+
+
+def unwrap(selection, settings, *, cut=(), follow=(), keep=False):
+    """Unwraps at once. Raises `engine.EngineMissing`, `engine.EngineError`.
+
+    `cut` and `follow` are kinds of marked edges: all cut, or where borders are drawn to. With `keep`, the analysis of
+    the mesh is kept for the next call, until another mesh is analysed or `kept_analysis.forget` is called.
+    """
+    return _result(engine.call(_caller("unwrap", _mesh(selection, cut, follow), settings, keep)))
+
+
+def unwrap_points(positions, settings):
+    """Maps a cloud at once. Raises `engine.EngineMissing`, `engine.EngineError`."""
+    return _result(engine.call(lambda module: module.unwrap_points(positions, **engine.native_settings(settings))))
+
+
+def submit_unwrap(selection, settings, *, cut=(), follow=(), keep=False):
+    """As `unwrap`, on another thread: a `Job`. Raises `engine.EngineMissing`, `engine.EngineError`."""
+    return Job(engine.call(_caller("submit_unwrap", _mesh(selection, cut, follow), settings, keep)))
+
+
+def submit_unwrap_points(positions, settings):
+    """Maps a cloud on another thread: a `Job`. Raises `engine.EngineMissing`, `engine.EngineError`."""
+    return Job(engine.call(lambda module: module.submit_unwrap_points(positions, **engine.native_settings(settings))))
+
+
+class Job:
+    """A computation on the native module's own thread."""
+
+    def __init__(self, native_job):
+        self._job = native_job
+
+    def progress(self):
+        """Share of the work done, 0 to 1."""
+        return float(self._job.progress())
+
+    def stage(self):
+        """What is being done, in a word or two."""
+        return str(self._job.stage()).replace("_", " ")
+
+    def is_finished(self):
+        return bool(self._job.is_finished())
+
+    def cancel(self):
+        self._job.cancel()
+
+    def result(self):
+        """The result of a finished job. Raises `engine.EngineError`, `engine.EngineCancelled`."""
+        return _result(engine.call(lambda module: self._job.result()))
