@@ -5,14 +5,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .settings_table import ZERO_STANDS_FOR_NONE
+
 # Slack of the certificate for what float32 coordinates cannot express.
 MARGIN_SLACK_TEXELS = 0.01
 STRETCH_SLACK = 1e-3
 
 # Gaps are searched for up to this distance, or twice the margin: what is reported at that value may be larger.
 SEARCHED_TEXELS = 8
-# Settings whose 0 in the panel is the native module's None.
-ZERO_IS_AUTOMATIC = ("landmark_max", "kernel_width", "weld_distance")
 
 
 class EngineMissing(Exception):
@@ -81,7 +81,7 @@ def native_settings(settings):
     for name, value in settings.items():
         if isinstance(value, str):
             value = value.lower()
-        elif name in ZERO_IS_AUTOMATIC and value == 0:
+        elif name in ZERO_STANDS_FOR_NONE and value == 0:
             value = None
         elif name == "texture_size" and not isinstance(value, int):
             value = tuple(value)

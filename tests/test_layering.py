@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "native/ble_unwrap_core/src"
 
-FOUNDATION = {"memory", "progress", "linalg", "mesh"}
+FOUNDATION = {"choice", "memory", "progress", "linalg", "mesh"}
 TOOLS = FOUNDATION | {"geodesics", "distortion"}
 # In the order of the pipeline. A stage sees the types that earlier stages put out, never their functions.
 STAGES = ["segmentation", "charts", "embedding", "stretch", "packing"]
@@ -25,6 +25,7 @@ GATHERED = {"error", "settings"}
 RESULTS = {"atlas", "clock", "report"}
 # Module of the core -> modules all of whose public items it may use.
 MAY_USE = {
+    "choice": set(),
     "memory": set(),
     "progress": {"memory"},
     "linalg": {"memory", "progress"},
@@ -39,13 +40,13 @@ MAY_USE = {
     "atlas": {"error", "report", "verify"},
     "clock": set(),
     "error": {"memory", "mesh", "metrics", "packing", "progress", "verify"},
-    "settings": {"embedding", "error", "geodesics", "mesh", "packing", "segmentation", "stretch"},
+    "settings": {"choice", "embedding", "error", "geodesics", "mesh", "packing", "segmentation", "stretch"},
     "flattening": TOOLS | {"embedding", "settings", "stretch"},
     # What sees several stages. None of the three sees another.
     "pipeline": TOOLS | set(STAGES) | JUDGES | GATHERED | RESULTS | {"flattening"},
     "cloud": TOOLS | set(STAGES) | GATHERED | {"clock", "report"},
     "standalone": TOOLS | set(STAGES) | JUDGES | GATHERED | {"clock", "flattening"},
-    "lib": {"atlas", "cloud", "error", "flattening", "mesh", "pipeline", "progress", "report", "settings", "verify"},
+    "lib": {"atlas", "choice", "cloud", "error", "flattening", "mesh", "pipeline", "progress", "report", "settings", "verify"},
 }
 # Module -> modules of which it may name types (in CamelCase) only.
 MAY_NAME_TYPES_OF = {
@@ -297,6 +298,7 @@ NEVER = {
         name: {".engine", ".mesh_bridge", ".cloud_bridge", ".properties", "ble_unwrap_native"}
         for name in ("mesh_arrays.py", "faces.py", "seams.py", "uv_maps.py", "textures.py", "units.py")
     },
+    "settings_table.py": {"bpy", "bmesh", "numpy", ".engine", ".properties", "ble_unwrap_native"},
     "last_result.py": {".engine", ".mesh_bridge", ".cloud_bridge", "ble_unwrap_native"},
     "mesh_bridge.py": {".engine", ".cloud_bridge", "ble_unwrap_native"},
     "cloud_bridge.py": {".engine", "ble_unwrap_native"},
