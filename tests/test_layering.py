@@ -46,7 +46,19 @@ MAY_USE = {
     "pipeline": TOOLS | set(STAGES) | JUDGES | GATHERED | RESULTS | {"flattening"},
     "cloud": TOOLS | set(STAGES) | GATHERED | {"clock", "report"},
     "standalone": TOOLS | set(STAGES) | JUDGES | GATHERED | {"clock", "flattening"},
-    "lib": {"atlas", "choice", "cloud", "error", "flattening", "mesh", "pipeline", "progress", "report", "settings", "verify"},
+    "lib": {
+        "atlas",
+        "choice",
+        "cloud",
+        "error",
+        "flattening",
+        "mesh",
+        "pipeline",
+        "progress",
+        "report",
+        "settings",
+        "verify",
+    },
 }
 # Module -> modules of which it may name types (in CamelCase) only.
 MAY_NAME_TYPES_OF = {

@@ -475,9 +475,7 @@ def test_the_stub_lists_every_setting():
     assert fields("_UnwrapSettings") == set(native.default_settings())
     functions = {
         "_EmbedSettings": lambda **settings: native.embed(np.zeros((1, 1)), **settings),
-        "_GeodesicDistancesSettings": lambda **settings: native.geodesic_distances(
-            *SQUARE, np.array([9]), **settings
-        ),
+        "_GeodesicDistancesSettings": lambda **settings: native.geodesic_distances(*SQUARE, np.array([9]), **settings),
         "_MeasureSettings": lambda **settings: native.measure(*SQUARE, np.zeros((1, 2)), **settings),
         "_PackSettings": lambda **settings: native.pack(np.zeros((0, 2)), *[np.zeros((1, 3), int)] * 2, **settings),
     }

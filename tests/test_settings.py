@@ -65,7 +65,7 @@ def at_the_ends(row):
                 math.nextafter(most, -math.inf) if row["most_open"] and row["most"] is not None else most,
             ]
             outside = [math.nextafter(inside[0], -math.inf), math.nextafter(inside[2], math.inf), math.nan, "1", True]
-    return (inside + [None], outside) if "none" in row else (inside, [*outside, None])
+    return ([*inside, None], outside) if "none" in row else (inside, [*outside, None])
 
 
 def call(name, value):
@@ -150,8 +150,8 @@ def sentences():
 
 
 def test_every_sentence_is_written_in_one_file():
-    # Lines may be broken, in Rust's strings by a backslash.
-    texts = [(path, re.sub(r"\s+", " ", text.replace("\\\n", ""))) for path, text in sources()]
+    # Lines may be broken: in Rust's strings by a backslash, in Python's by quotation marks.
+    texts = [(path, re.sub(r"\s+", " ", re.sub(r'\\\n|"\n\s*"', "", text))) for path, text in sources()]
     homes = [(path, text) for path, text in texts if not path.endswith(MADE)]
     for sentence in sentences():
         stem = sentence.rstrip(".")
@@ -176,16 +176,11 @@ def test_the_addon_says_only_how_settings_are_shown():
     assert declared == {*ROWS, "neighbours"}
 
 
-def test_the_binding_names_no_setting_and_no_choice():
-    """But for what `embed` takes in other forms, too."""
-    allowed = {"embed.rs": {"kernel_width", "initial"}}
+def test_the_binding_reads_keywords_by_the_table_alone():
+    source = (ROOT / "native/ble_unwrap_native/src/settings.rs").read_text(encoding="utf-8")
     words = {choice["word"] for row in TABLE["settings"] for choice in row.get("choices", ())}
-    known = {*ROWS, *ARGUMENTS, *(words - {"none"})}
-    for file in sorted((ROOT / "native/ble_unwrap_native/src").glob("*.rs")):
-        source = re.sub(r"(?m)//.*$|text_signature = .*$", "", file.read_text(encoding="utf-8"))
-        found = set(re.findall(r'"(\w+)"', source)) & known
-        print(file.name, found)
-        assert found <= allowed.get(file.name, set()), file.name
+    code = re.sub(r"(?m)//.*$|text_signature = .*$", "", source)
+    assert not set(re.findall(r'"(\w+)"', code)) & {*ROWS, *ARGUMENTS, *words}
 
 
 # The add-on's reading of it -----------------------------------------------------------------------------------------
@@ -218,6 +213,8 @@ def test_values_are_as_properties_hold_them(settings_table):
 
 
 def test_tooltips_end_without_a_full_stop_and_say_what_0_stands_for(settings_table):
-    assert settings_table.tooltip(ROWS["landmark_max"]) == "Most landmarks of a chart. 0 stands for no limit"
+    row = ROWS["landmark_max"]
+    assert settings_table.tooltip(row) == row["sentence"] + " 0 stands for no limit"
+    assert settings_table.tooltip(ROWS["seed"]) + "." == ROWS["seed"]["sentence"]
     assert set(settings_table.ZERO_STANDS_FOR_NONE) == {"landmark_max", "kernel_width", "weld_distance"}
     assert "limit_over" in settings_table.taken_by("unwrap") - settings_table.taken_by("unwrap_points")

@@ -21,7 +21,7 @@ pub enum Model {
     /// Bernoulli logistic embedding as printed: no intercepts, Gaussian kernel. Folds even flat sheets: of the
     /// triangles of a square of 1,000 vertices it flips 8 %, of a 3:1 rectangle half.
     Paper,
-    /// Classical scaling of geodesic distances, for comparison.
+    /// Classical scaling, which fits no likelihood.
     Isomap,
 }
 

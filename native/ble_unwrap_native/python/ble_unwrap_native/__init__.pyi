@@ -149,19 +149,53 @@ class _PackingGroup(TypedDict, total=False):
     """How charts may be turned to pack them tighter. "any": Charts are turned by any angle, which packs tightest. "quarter": Charts are turned by multiples of 90° from how they were flattened, not set upright. "none": Charts stay as they were flattened, at whatever angle that is."""
 
 @type_check_only
-class _UnwrapSettings(_CallSettings, _ChartsGroup, _LimitGroup, _WeldGroup, _GeodesicsGroup, _LandmarksGroup, _ModelGroup, _FitGroup, _StartGroup, _FlatteningGroup, _TextureGroup, _PackingGroup, total=False): ...
+class _UnwrapSettings(
+    _CallSettings,
+    _ChartsGroup,
+    _LimitGroup,
+    _WeldGroup,
+    _GeodesicsGroup,
+    _LandmarksGroup,
+    _ModelGroup,
+    _FitGroup,
+    _StartGroup,
+    _FlatteningGroup,
+    _TextureGroup,
+    _PackingGroup,
+    total=False,
+): ...
 
 @type_check_only
 class _AnalyseSettings(_CallSettings, _WeldGroup, total=False): ...
 
 @type_check_only
-class _UnwrapPointsSettings(_CallSettings, _LimitGroup, _LandmarksGroup, _ModelGroup, _FitGroup, _StartGroup, _TextureGroup, _PackingGroup, total=False): ...
+class _UnwrapPointsSettings(
+    _CallSettings,
+    _LimitGroup,
+    _LandmarksGroup,
+    _ModelGroup,
+    _FitGroup,
+    _StartGroup,
+    _TextureGroup,
+    _PackingGroup,
+    total=False,
+): ...
 
 @type_check_only
 class _EmbedSettings(_CallSettings, _ModelGroup, _FitGroup, total=False): ...
 
 @type_check_only
-class _FlattenSettings(_CallSettings, _WeldGroup, _GeodesicsGroup, _LandmarksGroup, _ModelGroup, _FitGroup, _StartGroup, _FlatteningGroup, total=False): ...
+class _FlattenSettings(
+    _CallSettings,
+    _WeldGroup,
+    _GeodesicsGroup,
+    _LandmarksGroup,
+    _ModelGroup,
+    _FitGroup,
+    _StartGroup,
+    _FlatteningGroup,
+    total=False,
+): ...
 
 @type_check_only
 class _TransformSettings(_CallSettings, total=False): ...
@@ -180,6 +214,7 @@ class _MeasureSettings(_CallSettings, _WeldGroup, _TextureGroup, total=False): .
 
 @type_check_only
 class _PackSettings(_CallSettings, _TextureGroup, _PackingGroup, total=False): ...
+
 # end of what `make settings` makes
 
 @final
