@@ -1,5 +1,6 @@
 # make test   everything: Rust, the wheel, Python without Blender, the add-on in every bpy that can be had
 # make demo   unwrap the demonstration meshes and compare with Smart UV Project: out/
+# make settings  what README, type stub, documentation and add-on say of the settings, from the core's table
 # make bench  times of the stages; make flamegraph where the time of one unwrap goes; make scaling time and memory against faces
 # make quality  charts, stretch, seams, packing and CPU seconds over shuffled triangulations: for before and after a change
 # make contact-sheet  every model under a checker beside its layout, in one picture: out/contact_sheet.png
@@ -16,9 +17,9 @@ BIN := $(VENV)/bin
 WHEELS := addon/wheels
 CRATES := native/ble_unwrap_core native/ble_unwrap_native
 # What the wheel is made of. Official Blender runs on glibc 2.28, which zig links against on any newer system.
-NATIVE := Cargo.toml Cargo.lock .ci/build_wheel .ci/third_party_licenses $(shell find $(CRATES) -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' 2>/dev/null)
+NATIVE := Cargo.toml Cargo.lock .ci/build_wheel .ci/third_party_licenses $(shell find $(CRATES) -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name settings.txt 2>/dev/null)
 
-.PHONY: test test-rust test-python test-blender bench flamegraph scaling quality contact-sheet lint format venv wheel zip demo \
+.PHONY: test test-rust test-python test-blender settings bench flamegraph scaling quality contact-sheet lint format venv wheel zip demo \
 	paper paper-page clean
 
 test: test-rust lint test-python test-blender
@@ -28,6 +29,11 @@ test-rust:
 	$(CARGO) clippy --workspace --all-targets --locked -- -D warnings
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc --workspace --no-deps --locked --document-private-items
 	$(CARGO) test --locked
+
+settings:
+	$(CARGO) run --quiet --locked -p ble_unwrap_core --example settings_table > addon/settings.json.partial
+	mv addon/settings.json.partial addon/settings.json
+	$(PYTHON) .ci/settings_pages
 
 # Figures and what they mean: native/ble_unwrap_core/benches/README.md. BENCH=unwrap/sculpt/972 runs one, BENCH=pack one stage.
 bench:

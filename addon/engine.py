@@ -1,7 +1,6 @@
 """The native module, loaded, called and its exceptions translated: alone imports `ble_unwrap_native`."""
 
-# Settings whose 0 in the panel is the native module's None.
-ZERO_IS_AUTOMATIC = ("landmark_max", "kernel_width", "weld_distance")
+from .settings_table import ZERO_STANDS_FOR_NONE
 
 
 class EngineMissing(Exception):
@@ -48,7 +47,7 @@ def native_settings(settings):
     for name, value in settings.items():
         if isinstance(value, str):
             value = value.lower()
-        elif name in ZERO_IS_AUTOMATIC and value == 0:
+        elif name in ZERO_STANDS_FOR_NONE and value == 0:
             value = None
         elif name == "texture_size" and not isinstance(value, int):
             value = tuple(value)

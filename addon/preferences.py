@@ -3,17 +3,20 @@
 import bpy
 from bpy.props import BoolProperty, IntProperty
 
+from . import settings_table
+
+THREADS = settings_table.ARGUMENTS["threads"]
+
 
 class BLEUnwrapPreferences(bpy.types.AddonPreferences):
     bl_idname = __package__
 
     threads: IntProperty(
-        name="Threads",
-        description="Processor threads to use; 0 takes all. The result does not depend on it",
-        default=0,
-        min=0,
-        max=1024,
+        name=THREADS["label"],
+        description=settings_table.tooltip(THREADS),
+        default=THREADS["default"],
         soft_max=64,
+        **settings_table.bounds(THREADS),
     )
     modal_threshold: IntProperty(
         name="Show Progress From",

@@ -1,36 +1,40 @@
-"""Every setting of the add-on, declared once.
+"""Every setting of the add-on.
 
 `BLEUnwrapSettings` holds them in the scene, where the panel shows them. The operator, the command line and the
-reports derive theirs from its annotations, so a setting added here appears everywhere. Names equal those of the
-native module where it has the setting; the others are handled on Blender's side (`BRIDGE_SETTINGS`).
+reports derive theirs from its annotations, so a setting added here appears everywhere. What the native module has, too,
+is `declared` by its name there: label, tooltip, default and range come from the core's table (`settings_table`), and
+only how it is shown is said here. The others are handled on Blender's side (`BRIDGE_SETTINGS`).
 """
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, IntVectorProperty, StringProperty
 
-# What the paper's method differs in from the defaults below; shown in the panel when the preset is chosen.
-# The native module knows the same presets by name: a test keeps the two in step.
-PAPER_VALUES = {
-    "model": "PAPER",
-    "kernel_width": 0.0,
-    "relaxation": 1.7,
-    "initial": "RANDOM",
-    "geodesics": "FAST_MARCHING",
-    "landmark_min": 3,
-    "landmark_max": 0,
-    "together_max": 2000,
-    "holes": "CUT",
-    "coarse": False,
-    "least_sewn": 1000.0,
-    "stretch_solver": "LINE_SEARCH",
-    "stretch_iterations": 60,
-    "rotation": "QUARTER",
-}
-# Preset -> what it differs in from the defaults.
-PRESET_VALUES = {"PAPER": PAPER_VALUES, "ISO_CHARTS": PAPER_VALUES | {"model": "ISOMAP"}}
+from . import settings_table
+
 # What an artist wants of the result whatever the method: presets leave these alone, and the native module, whose
 # presets have values of their own for them, always gets them.
 KEPT_BY_PRESETS = ("stretch_limit", "texture_size", "margin")
+# Preset -> what it differs in from the defaults; shown in the panel when the preset is chosen.
+PRESET_VALUES = {preset: settings_table.differences(preset, KEPT_BY_PRESETS) for preset in settings_table.PRESETS}
+
+
+def declared(name, **presentation):
+    """The property of a setting, or of a further argument, of the native module. `presentation` is how it is shown."""
+    row = settings_table.SETTINGS.get(name) or settings_table.ARGUMENTS[name]
+    default = settings_table.value(name) if name in settings_table.SETTINGS else row["default"]
+    keywords = {"name": row["label"], "description": settings_table.tooltip(row), "default": default, **presentation}
+    match row["kind"]:
+        case "flag":
+            return BoolProperty(**keywords)
+        case "choice":
+            return EnumProperty(items=settings_table.items(row["choices"]), **keywords)
+        case "real":
+            return FloatProperty(**settings_table.bounds(row, presentation["precision"]), **keywords)
+        case "whole":
+            return IntProperty(**settings_table.bounds(row), **keywords)
+        case "size":
+            return IntVectorProperty(size=2, **settings_table.bounds(row), **keywords)
+    raise ValueError(f"{name}: no property holds a {row['kind']}")
 
 
 def _apply_preset(settings, _context):
@@ -48,80 +52,17 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     preset: EnumProperty(
         name="Preset",
         description="How it is done: values of all settings but stretch limit, texture size, margin and the result's",
-        items=(
-            ("DEFAULT", "Default", "Extended model, fast solvers: least stretch and fewest charts"),
-            ("PAPER", "Paper", "The published method as printed: slower, more charts"),
-            ("ISO_CHARTS", "Iso-charts", "The same with Isomap, the method the paper compares itself with"),
-        ),
+        items=settings_table.preset_items(),
         default="DEFAULT",
         update=_apply_preset,
     )
 
     # ---- what an artist needs
-    stretch_limit: FloatProperty(
-        name="Stretch Limit",
-        description=(
-            "Largest L2 stretch that any chart may have; 1 is none. Lower values give less distortion and more seams"
-        ),
-        default=1.1,
-        min=1.001,
-        max=100.0,
-        soft_min=1.01,
-        soft_max=1.5,
-        step=1,
-        precision=3,
-    )
-    limit_over: EnumProperty(
-        name="Limit Over",
-        description="What may not be stretched beyond the limit",
-        items=(
-            ("CHART", "Each Chart", "No chart is stretched beyond the limit"),
-            (
-                "ATLAS",
-                "Whole Atlas",
-                "All charts together keep the limit, some exceed it, up to fourfold above 1: fewer charts",
-            ),
-        ),
-        default="CHART",
-    )
-    texture_size: IntVectorProperty(
-        name="Texture Size",
-        description=(
-            "Width and height in pixels of the texture that the UVs are meant for: its proportions and, for the "
-            "margin, its resolution"
-        ),
-        default=(2048, 2048),
-        size=2,
-        min=16,
-        max=16384,
-        soft_min=256,
-        soft_max=8192,
-    )
-    margin: FloatProperty(
-        name="Margin",
-        description="Least distance between two charts, in pixels of the texture; half of it is kept to the border",
-        default=4.0,
-        min=0.0,
-        max=256.0,
-        soft_max=32.0,
-        step=50,
-        precision=1,
-        subtype="PIXEL",
-    )
-    rotation: EnumProperty(
-        name="Rotation",
-        description="How charts may be turned to pack them tighter",
-        items=(
-            ("ANY", "Any", "Any angle: tightest"),
-            (
-                "QUARTER",
-                "Quarter Turns",
-                "By multiples of 90° from how they were flattened; not set upright",
-            ),
-            ("NONE", "None", "As they were flattened, at whatever angle that is"),
-        ),
-        default="ANY",
-    )
+    stretch_limit: declared("stretch_limit", soft_min=1.01, soft_max=1.5, step=1, precision=3)
+    limit_over: declared("limit_over")
+    texture_size: declared("texture_size", soft_min=256, soft_max=8192)
+    margin: declared("margin", soft_max=32.0, step=50, precision=1, subtype="PIXEL")
+    rotation: declared("rotation")
     use_seams: BoolProperty(
         name="Cut at Seams",
         description=(
@@ -195,240 +136,50 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     )
 
     # ---- charts
-    weld: BoolProperty(
-        name="Weld Vertices",
-        description="Let charts run across vertices at the same place, as imported files often have; the mesh is kept",
-        default=False,
-    )
-    weld_distance: FloatProperty(
-        name="Weld Distance",
-        description=(
-            "How near to each other vertices are that Weld Vertices takes for one; never two of one face. "
-            "0 takes what single precision cannot tell apart at this size"
-        ),
-        default=0.0,
-        min=0.0,
-        max=1e6,
-        soft_max=1.0,
-        step=0.1,
-        precision=6,
-        unit="LENGTH",
-    )
-    coarse: BoolProperty(
-        name="Coarse First",
-        description="Decide on a coarse copy where to cut large pieces of surface, which is many times faster",
-        default=True,
-    )
-    merge: BoolProperty(
-        name="Merge Charts",
-        description="Join neighbouring charts again where their union stays within the stretch limit",
-        default=True,
-    )
-    holes: EnumProperty(
-        name="Holes",
-        description="What happens to charts with holes",
-        items=(
-            ("KEEP", "Keep", "A chart may have holes; other charts may be packed into them"),
-            ("CUT", "Cut", "Every chart is cut open to a disk"),
-        ),
-        default="KEEP",
-    )
-    chart_scale: EnumProperty(
-        name="Chart Scale",
-        description="How large charts are relative to each other",
-        items=(
-            ("UNIFORM", "Uniform", "The same texel density everywhere"),
-            ("STRETCH", "By Stretch", "More pixels where a chart is stretched, between half and double"),
-        ),
-        default="UNIFORM",
-    )
-    least_sewn: FloatProperty(
-        name="Least Sewn",
-        description=(
-            "Charts are sewn along a part of their border, the rest left open, if that part is this long beside the "
-            "width of the smaller one. Less gives fewer charts, more gives compact ones, 1000 makes no darts"
-        ),
-        default=0.2,
-        min=0.0,
-        max=1000.0,
-        soft_max=2.0,
-        step=10,
-        precision=2,
-    )
-    crease_weight: FloatProperty(
-        name="Crease Weight",
-        description="How strongly borders are drawn to folds of the surface; 0 looks at their length alone",
-        default=1.0,
-        min=0.0,
-        max=2.0,
-        step=10,
-        precision=2,
-    )
-    seed: IntProperty(
-        name="Seed",
-        description="Start of all random choices; the same seed gives the same result on any machine",
-        default=0,
-        min=0,
-    )
+    weld: declared("weld")
+    weld_distance: declared("weld_distance", soft_max=1.0, step=0.1, precision=6, unit="LENGTH")
+    coarse: declared("coarse")
+    merge: declared("merge")
+    holes: declared("holes")
+    chart_scale: declared("chart_scale")
+    least_sewn: declared("least_sewn", soft_max=2.0, step=10, precision=2)
+    crease_weight: declared("crease_weight", step=10, precision=2)
+    seed: declared("seed")
 
-    neighbours: IntProperty(
-        name="Neighbours",
-        description="Nearest points that each point of a cloud is joined to; more bridge gaps, fewer keep sheets apart",
-        default=12,
-        min=4,
-        max=256,
-        soft_max=64,
-    )
+    neighbours: declared("neighbours", soft_max=64)
 
     # ---- landmarks and distances
-    geodesics: EnumProperty(
-        name="Geodesics",
-        description="How distances along the surface are measured",
-        items=(
-            ("FAST_MARCHING", "Fast Marching", "Wave fronts across triangles: accurate"),
-            ("DIJKSTRA", "Dijkstra", "Shortest paths along edges: some 6% too long, faster"),
-        ),
-        default="FAST_MARCHING",
-    )
-    landmark_fraction: FloatProperty(
-        name="Landmarks",
-        description="Share of a chart's vertices that serve as landmarks of the embedding",
-        default=0.01,
-        min=0.0001,
-        max=1.0,
-        soft_max=0.1,
-        step=1,
-        precision=4,
-    )
-    landmark_min: IntProperty(
-        name="At Least",
-        description="Fewest landmarks of a chart",
-        default=48,
-        min=3,
-        max=100_000,
-        soft_max=1000,
-    )
-    landmark_max: IntProperty(
-        name="At Most",
-        description="Most landmarks of a chart; 0 sets no bound",
-        default=64,
-        min=0,
-        max=100_000,
-        soft_max=2000,
-    )
-    together_max: IntProperty(
-        name="Together",
-        description=(
-            "Charts of at most so many vertices are embedded with all their vertices together, as in the paper, at a "
-            "cost of the square of their number; larger ones by their landmarks"
-        ),
-        default=0,
-        min=0,
-        max=20_000,
-        soft_max=2000,
-    )
+    geodesics: declared("geodesics")
+    landmark_fraction: declared("landmark_fraction", soft_max=0.1, step=1, precision=4)
+    landmark_min: declared("landmark_min", soft_max=1000)
+    landmark_max: declared("landmark_max", soft_max=2000)
+    together_max: declared("together_max", soft_max=2000)
 
     # ---- embedding
-    model: EnumProperty(
-        name="Model",
-        description="How a chart is laid out in the plane before its stretch is minimised",
-        items=(
-            ("DEFAULT", "Extended", "Bernoulli logistic embedding with intercepts and logistic affinity"),
-            ("PAPER", "As Printed", "Bernoulli logistic embedding as in the paper: Gaussian affinity, no intercepts"),
-            ("ISOMAP", "Isomap", "Classical scaling of geodesic distances, for comparison"),
-        ),
-        default="DEFAULT",
-    )
-    kernel_width: FloatProperty(
-        name="Kernel Width",
-        description=(
-            "Width of the affinity as a multiple of the mean squared distance; useful from 0.1 to 0.3. "
-            "0 takes the model's own"
-        ),
-        default=0.2,
-        min=0.0,
-        max=10.0,
-        soft_max=1.0,
-        step=1,
-        precision=3,
-    )
-    relaxation: FloatProperty(
-        name="Relaxation",
-        description="Over-relaxation of the sweeps; the likelihood never falls between 0 and 2",
-        default=1.6,
-        min=0.01,
-        max=1.99,
-        step=10,
-        precision=2,
-    )
-    max_sweeps: IntProperty(
-        name="Sweeps",
-        description="Most sweeps over all points",
-        default=60,
-        min=1,
-        max=10000,
-        soft_max=500,
-    )
-    tolerance: FloatProperty(
-        name="Tolerance",
-        description="Relative change of the likelihood at which the sweeps stop",
-        default=1e-5,
-        min=1e-7,
-        max=0.1,
-        step=1,
-        precision=7,
-    )
-    update: EnumProperty(
-        name="Update",
-        description="Order in which points move",
-        items=(
-            ("SERIAL", "Serial", "One after another: the likelihood rises at every step"),
-            ("PARALLEL", "Parallel", "All at once from the same state: needs a relaxation below 1"),
-        ),
-        default="SERIAL",
-    )
-    initial: EnumProperty(
-        name="Start",
-        description="Where the embedding starts from",
-        items=(
-            ("MDS", "Classical Scaling", "Multidimensional scaling of the landmarks: fewest sweeps"),
-            ("RANDOM", "Random", "Normally distributed points, drawn from the seed"),
-        ),
-        default="MDS",
-    )
+    model: declared("model")
+    kernel_width: declared("kernel_width", soft_max=1.0, step=1, precision=3)
+    relaxation: declared("relaxation", step=10, precision=2)
+    max_sweeps: declared("max_sweeps", soft_max=500)
+    tolerance: declared("tolerance", soft_max=0.1, step=1, precision=7)
+    update: declared("update")
+    initial: declared("initial")
 
     # ---- stretch
-    stretch_solver: EnumProperty(
-        name="Stretch Solver",
-        description="How the stretch of a chart is minimised",
-        items=(
-            ("NEWTON", "Newton", "Projected Newton steps: fast"),
-            ("LINE_SEARCH", "Line Search", "One vertex at a time along random directions, as in the paper"),
-        ),
-        default="NEWTON",
-    )
-    stretch_iterations: IntProperty(
-        name="Iterations",
-        description="Most iterations of the stretch solver",
-        default=40,
-        min=1,
-        max=10000,
-        soft_max=500,
-    )
+    stretch_solver: declared("stretch_solver")
+    stretch_iterations: declared("stretch_iterations", soft_max=500)
 
 
 # Settings that the native module never sees.
-BRIDGE_SETTINGS = (
-    *("use_seams", "follow_seams", "follow_sharp", "follow_materials", "use_selection", "move_pinned"),
-    *("uv_map", "uv_map_name", "correct_aspect", "use_original_bounds", "mark_seams"),
+BRIDGE_SETTINGS = tuple(
+    name
+    for name in BLEUnwrapSettings.__annotations__
+    if name not in {"preset", *settings_table.SETTINGS, *settings_table.ARGUMENTS}
 )
 # What means something for surfaces only, or for clouds only; the other one's functions do not take it.
 SURFACE_SETTINGS = (
     *("use_seams", "follow_seams", "follow_sharp", "follow_materials", "mark_seams"),
     *("move_pinned", "correct_aspect"),
-    *("limit_over", "weld", "weld_distance", "merge", "least_sewn", "holes", "chart_scale"),
-    *("crease_weight", "geodesics"),
-    *("together_max", "stretch_solver", "stretch_iterations"),
+    *sorted(settings_table.taken_by("unwrap") - settings_table.taken_by("unwrap_points")),
 )
 CLOUD_SETTINGS = ("neighbours",)
 

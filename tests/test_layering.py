@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "native/ble_unwrap_core/src"
 
-FOUNDATION = {"memory", "progress", "linalg", "mesh"}
+FOUNDATION = {"choice", "memory", "progress", "linalg", "mesh"}
 TOOLS = FOUNDATION | {"geodesics", "distortion"}
 # In the order of the pipeline. A stage sees the types that earlier stages put out, never their functions.
 STAGES = ["segmentation", "charts", "embedding", "stretch", "packing"]
@@ -25,6 +25,7 @@ GATHERED = {"error", "settings"}
 RESULTS = {"atlas", "clock", "report"}
 # Module of the core -> modules all of whose public items it may use.
 MAY_USE = {
+    "choice": set(),
     "memory": set(),
     "progress": {"memory"},
     "linalg": {"memory", "progress"},
@@ -39,13 +40,25 @@ MAY_USE = {
     "atlas": {"error", "report", "verify"},
     "clock": set(),
     "error": {"memory", "mesh", "metrics", "packing", "progress", "verify"},
-    "settings": {"embedding", "error", "geodesics", "mesh", "packing", "segmentation", "stretch"},
+    "settings": {"choice", "embedding", "error", "geodesics", "mesh", "packing", "segmentation", "stretch"},
     "flattening": TOOLS | {"embedding", "settings", "stretch"},
     # What sees several stages. None of the three sees another.
     "pipeline": TOOLS | set(STAGES) | JUDGES | GATHERED | RESULTS | {"flattening"},
     "cloud": TOOLS | set(STAGES) | GATHERED | {"clock", "report"},
     "standalone": TOOLS | set(STAGES) | JUDGES | GATHERED | {"clock", "flattening"},
-    "lib": {"atlas", "cloud", "error", "flattening", "mesh", "pipeline", "progress", "report", "settings", "verify"},
+    "lib": {
+        "atlas",
+        "choice",
+        "cloud",
+        "error",
+        "flattening",
+        "mesh",
+        "pipeline",
+        "progress",
+        "report",
+        "settings",
+        "verify",
+    },
 }
 # Module -> modules of which it may name types (in CamelCase) only.
 MAY_NAME_TYPES_OF = {
@@ -169,7 +182,7 @@ def test_core_layers():
 PIPELINE = [
     {"memo", "needs", "rigid", "tally"},
     {"flatten"},
-    {"polygon", "relief", "sew", "darts", "recut", "ribbons", "prolong", "unbend"},
+    {"polygon", "relief", "sew", "darts", "recut", "ribbons", "prolong", "touch_up"},
     {"charting", "carry", "budget"},
     {"merge"},
     {"component"},
@@ -294,7 +307,7 @@ def tops(names: set[str]) -> set[str]:
 # The add-on's way to the native module and back, and the judges: they know plain arrays and numbers, and run without
 # Blender. Each with all that it may import besides the standard library.
 PLAIN_MAY_IMPORT = {
-    "engine.py": {"ble_unwrap_native"},
+    "engine.py": {"ble_unwrap_native", ".settings_table"},
     "kept_analysis.py": {"numpy", ".engine"},
     "computation.py": {"numpy", ".engine", ".kept_analysis"},
     "measurement.py": {"numpy", ".engine"},
@@ -312,6 +325,7 @@ NEVER = {
         f"{name}.py": NATIVE | BRIDGES | {".properties"}
         for name in ("mesh_arrays", "faces", "seams", "uv_maps", "textures", "units")
     },
+    "settings_table.py": NATIVE | BRIDGES | {"bpy", "bmesh", "numpy", ".properties"},
     "last_result.py": NATIVE | BRIDGES,
     "mesh_bridge.py": NATIVE | {".cloud_bridge"},
     "cloud_bridge.py": NATIVE,

@@ -2,7 +2,7 @@
 
 import argparse
 
-from .. import asset_io, properties
+from .. import asset_io, properties, settings_table
 
 # No selection and no old place exist for a file.
 EXCLUDED_SETTINGS = ("use_selection",)
@@ -19,8 +19,8 @@ def add_setting_arguments(parser):
         text = keywords["description"].replace("%", "%%")
         default = keywords["default"]
         shown = _shown(default)
-        if name in properties.PAPER_VALUES:
-            shown += f"; {_shown(properties.PAPER_VALUES[name])} with --preset paper"
+        if name in properties.PRESET_VALUES["PAPER"]:
+            shown += f"; {_shown(properties.PRESET_VALUES['PAPER'][name])} with --preset paper"
         extra = {"dest": "setting_" + name, "default": None, "help": f"{text} (default: {shown})"}
         if isinstance(default, bool):
             group.add_argument(option, action=argparse.BooleanOptionalAction, **extra)
@@ -44,8 +44,9 @@ def _ranged(kind, keywords):
         if kind is str:
             return value
         low, high = keywords.get("min", -float("inf")), keywords.get("max", float("inf"))
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"{text} is not between {low} and {high}")
+        if not low <= value <= high or value == float("inf"):
+            between = f"between {low} and {high}" if high < float("inf") else f"a finite number from {low} on"
+            raise argparse.ArgumentTypeError(f"{text} is not {between}")
         return value
 
     parse.__name__ = kind.__name__
@@ -67,10 +68,13 @@ def settings_of(arguments, parser):
                 parser.error(f"--texture-size: one or two numbers of pixels between {low} and {high}")
             value = (value[0], value[-1])
         result[name] = value
-    if 0 < result.get("landmark_max", 0) < 3:
-        parser.error("--landmark-max: 0 for no bound, or at least 3")
-    if not 0 <= getattr(arguments, "threads", 0) <= 1024:
-        parser.error("--threads: between 0 and 1024")
+    for name in settings_table.ZERO_STANDS_FOR_NONE & set(result):
+        row = settings_table.SETTINGS[name]
+        if 0 < result[name] < row["least"]:
+            parser.error(f"--{name.replace('_', '-')}: 0 for {row['none']}, or at least {row['least']}")
+    threads = settings_table.ARGUMENTS["threads"]
+    if not threads["least"] <= getattr(arguments, "threads", threads["default"]) <= threads["most"]:
+        parser.error(f"--threads: between {threads['least']} and {threads['most']}")
     return result
 
 
@@ -103,7 +107,9 @@ def make_parser():
         help="one atlas for all meshes of an asset, or one each; points always have one each (default: asset)",
     )
     parser.add_argument("--compare", action="store_true", help="also measure Smart UV Project at the same margin")
-    parser.add_argument("--threads", type=int, default=0, help="processor threads, 0 for all (default: 0)")
+    threads = settings_table.ARGUMENTS["threads"]
+    text = f"{settings_table.tooltip(threads)} (default: {threads['default']})"
+    parser.add_argument("--threads", type=int, default=threads["default"], help=text)
     parser.add_argument("--quiet", action="store_true", help="print errors only")
     add_setting_arguments(parser)
     return parser

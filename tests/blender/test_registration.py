@@ -77,17 +77,29 @@ def test_settings_of_surfaces_are_those_that_clouds_do_not_take(addon):
         assert taken is (name not in properties.SURFACE_SETTINGS), name
 
 
-def test_neighbours_default_and_range_are_the_native_modules(addon):
-    engine, computation = addon("engine"), addon("computation")
-    keywords = addon("properties").annotations()["neighbours"].keywords
-    points = np.random.default_rng(0).random((40, 3)).astype(np.float32)
-    default = computation.unwrap_points(points, {}).uv
-    assert np.array_equal(computation.unwrap_points(points, {"neighbours": keywords["default"]}).uv, default)
-    for value in (keywords["min"], keywords["max"]):
-        computation.unwrap_points(points, {"neighbours": value})
-    for value in (keywords["min"] - 1, keywords["max"] + 1):
-        with pytest.raises(engine.EngineError, match="neighbours"):
-            computation.unwrap_points(points, {"neighbours": value})
+def test_what_a_property_can_hold_the_native_module_takes(addon):
+    """At both ends of every property as Blender keeps it, in single precision."""
+    properties, engine, table = addon("properties"), addon("engine"), addon("settings_table")
+    computation = addon("computation")
+    cloud = np.zeros((0, 3), np.float32)
+    rna = bpy.context.scene.ble_unwrap.bl_rna.properties
+    for name in (*table.SETTINGS, "neighbours"):
+        if rna[name].type not in {"INT", "FLOAT"}:
+            continue
+        row = table.SETTINGS.get(name) or table.ARGUMENTS[name]
+        for value in (rna[name].hard_min, rna[name].hard_max):
+            # Bounds of landmarks that contradict each other, and a margin as wide as the texture, are refused for that.
+            others = {"landmark_min": {"landmark_max": 0}, "landmark_max": {"landmark_min": 3}}
+            others |= {"texture_size": {"margin": 0.0}, "margin": {"texture_size": (4096, 4096)}}
+            given = {**others.get(name, {}), name: (value, value) if name == "texture_size" else value}
+            if name in properties.SURFACE_SETTINGS:
+                empty = np.zeros((0, 3), np.float32), np.zeros(0, np.int32), np.zeros(1, np.int32)
+                engine.native().unwrap(*empty, **engine.native_settings(given))
+            else:
+                computation.unwrap_points(cloud, given)
+            ends = (row["least"], row["most"] if row["most"] is not None else np.inf)
+            zero = name in table.ZERO_STANDS_FOR_NONE and value == 0
+            assert zero or ends[0] <= value <= ends[1], (name, value)
 
 
 def test_choosing_a_preset_keeps_where_the_result_goes():

@@ -23,7 +23,7 @@ pub enum UnwrapError {
         /// What was given.
         value: String,
         /// What is allowed.
-        allowed: &'static str,
+        allowed: String,
     },
     /// The charts cannot be packed as asked.
     #[error(transparent)]

@@ -22,6 +22,7 @@
 
 mod atlas;
 pub mod charts;
+mod choice;
 mod clock;
 pub mod cloud;
 pub mod distortion;
@@ -39,12 +40,13 @@ mod progress;
 mod report;
 pub mod rounding;
 pub mod segmentation;
-mod settings;
+pub mod settings;
 pub mod standalone;
 pub mod stretch;
 mod verify;
 
 pub use atlas::Atlas;
+pub use choice::{Choice, Named};
 pub use cloud::{CloudError, CloudReport, PointAtlas, unwrap_points};
 pub use error::UnwrapError;
 pub use flattening::{Rung, Rungs};

@@ -2,7 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use ble_unwrap_core::cloud::{DEFAULT_NEIGHBOURS, unwrap_points};
+use ble_unwrap_core::cloud::unwrap_points;
+use ble_unwrap_core::settings::NEIGHBOURS;
 use ble_unwrap_core::{CloudError, PointAtlas, Progress, Settings};
 use ble_unwrap_fixtures::random;
 
@@ -15,7 +16,7 @@ fn settings() -> Settings {
 /// Unwraps and checks what holds for every cloud.
 fn run(positions: &[[f64; 3]]) -> PointAtlas {
     let settings = settings();
-    let atlas = unwrap_points(positions, DEFAULT_NEIGHBOURS, &settings, &Progress::new()).expect("a valid cloud");
+    let atlas = unwrap_points(positions, NEIGHBOURS.default, &settings, &Progress::new()).expect("a valid cloud");
     atlas.check_invariants(positions, [512, 512], settings.packing.margin_texels).expect("the promises hold");
     assert_eq!(atlas.report.points, positions.len());
     atlas

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use ble_unwrap_core::settings::Function;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::errors::Failure;
 use crate::job::Job;
-use crate::settings::{self, Call, Function};
+use crate::settings::{self, Call};
 use crate::unwrap::{MeshArrays, to_python};
 
 /// A mesh made ready to be unwrapped with several settings, one after another.

@@ -2,6 +2,7 @@
 
 use ble_unwrap_core::CloudReport;
 use ble_unwrap_core::cloud;
+use ble_unwrap_core::settings::{Function, NEIGHBOURS};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -10,7 +11,7 @@ use crate::errors::Failure;
 use crate::job::Job;
 use crate::owned_array::{Array, Reduced};
 use crate::report::sums;
-use crate::settings::{self, Function};
+use crate::settings;
 
 /// UVs of a point cloud, and what is known about them.
 ///
@@ -150,9 +151,8 @@ pub(crate) fn submit_unwrap_points<'py>(
     settings: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, Job>> {
     let call = settings::from_keywords(settings, Function::UnwrapPoints)?;
-    let range = [cloud::LEAST_NEIGHBOURS, cloud::MOST_NEIGHBOURS];
-    let neighbours =
-        neighbours.map_or(Ok(cloud::DEFAULT_NEIGHBOURS), |given| settings::whole("neighbours", given, range, ""))?;
+    let neighbours = neighbours
+        .map_or(Ok(NEIGHBOURS.default), |given| settings::whole(NEIGHBOURS.name, given, NEIGHBOURS.range, ""))?;
     let positions = arrays::real_rows(positions, Argument { name: "positions", shape: "(n, 3)" })?;
     let job = Job::given_or_new(py, job)?;
     let work = move |progress: &_| {

@@ -1,6 +1,7 @@
 //! `geodesic_distances` on meshes and `graph_distances` of clouds.
 
-use ble_unwrap_core::standalone::{CloudDistanceSettings, cloud_distances, surface_distances};
+use ble_unwrap_core::settings::Function;
+use ble_unwrap_core::standalone::{CloudDistanceSettings, Connect, cloud_distances, surface_distances};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -8,7 +9,7 @@ use crate::arrays::{self, Argument};
 use crate::errors::{Failure, InvalidArgumentError};
 use crate::job::Job;
 use crate::owned_array::Array;
-use crate::settings::{self, Function};
+use crate::settings;
 use crate::unwrap::MeshArrays;
 
 /// Distances along a surface from some vertices to all.
@@ -143,7 +144,8 @@ pub(crate) fn graph_distances(
         cloud.neighbours = settings::whole("neighbours", given, [1, MOST_NEIGHBOURS], "")?;
     }
     if let Some(given) = connect {
-        settings::set_word("connect", &mut cloud.connect, given)?;
+        let choices = [("error", Connect::Error), ("bridge", Connect::Bridge), ("separate", Connect::Separate)];
+        cloud.connect = settings::one_of("connect", &choices, given)?;
     }
     if let Some(given) = radius {
         cloud.radius = settings::positive("radius", given, ", or None for no bound")?;

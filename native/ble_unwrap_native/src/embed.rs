@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use ble_unwrap_core::embedding::{self, EmbedInput, EmbedOptions, KernelWidth, PointMetric};
+use ble_unwrap_core::settings::Function;
 use ble_unwrap_core::standalone::CloudDistanceSettings;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
@@ -11,8 +12,7 @@ use crate::arrays::{self, Argument};
 use crate::errors::{Failure, InvalidArgumentError};
 use crate::job::Job;
 use crate::owned_array::Array;
-use crate::settings::{self, Call, Function};
-use crate::words::{Words, words};
+use crate::settings::{self, Call};
 
 /// Points in few dimensions, and how they were found.
 ///
@@ -105,7 +105,14 @@ pub(crate) enum DataKind {
     Affinities,
 }
 
-words!(DataKind { "points" => Points, "distances" => Distances, "affinities" => Affinities });
+impl DataKind {
+    const ALL: [(&str, Self); 3] =
+        [("points", Self::Points), ("distances", Self::Distances), ("affinities", Self::Affinities)];
+
+    fn word(self) -> &'static str {
+        Self::ALL.iter().find(|(_, kind)| *kind == self).map_or("", |(word, _)| *word)
+    }
+}
 
 /// How far apart points are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,7 +123,9 @@ pub(crate) enum PointDistance {
     Geodesic,
 }
 
-words!(PointDistance { "euclidean" => Euclidean, "geodesic" => Geodesic });
+impl PointDistance {
+    const ALL: [(&str, Self); 2] = [("euclidean", Self::Euclidean), ("geodesic", Self::Geodesic)];
+}
 
 /// Points can span no more dimensions than there are of them, and their n² distances must fit in memory.
 const MOST_DIMENSIONS: usize = 100_000;
@@ -201,10 +210,7 @@ pub(crate) fn embed(
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
     let mut call = settings::from_keywords(settings, Function::Embed)?;
-    let mut chosen = DataKind::Points;
-    if let Some(kind) = kind {
-        settings::set_word("kind", &mut chosen, kind)?;
-    }
+    let chosen = kind.map_or(Ok(DataKind::Points), |given| settings::one_of("kind", &DataKind::ALL, given))?;
     let whole = |name, given: Option<&Bound<'_, PyAny>>, usual, most| {
         given.map_or(Ok(usual), |given| settings::whole(name, given, [1, most], ""))
     };
@@ -275,11 +281,8 @@ fn deliver(py: Python<'_>, n: usize, mut fitted: embedding::Embedding) -> PyResu
 
 /// How distances of points are measured; an error for data that are no points.
 fn point_metric(given: Option<&Bound<'_, PyAny>>, kind: DataKind, neighbours: usize) -> PyResult<PointMetric> {
-    let mut chosen = PointDistance::Euclidean;
-    if let Some(given) = given {
-        settings::set_word("metric", &mut chosen, given)?;
-    }
-    match chosen {
+    let usual = PointDistance::Euclidean;
+    match given.map_or(Ok(usual), |given| settings::one_of("metric", &PointDistance::ALL, given))? {
         PointDistance::Euclidean => Ok(PointMetric::Euclidean),
         PointDistance::Geodesic if kind == DataKind::Points => Ok(PointMetric::Geodesic { neighbours }),
         PointDistance::Geodesic => Err(InvalidArgumentError::new_err(format!(

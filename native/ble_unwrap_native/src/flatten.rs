@@ -1,5 +1,7 @@
 //! `flatten`: one patch to one chart, step by step.
 
+use ble_unwrap_core::Choice;
+use ble_unwrap_core::settings::Function;
 use ble_unwrap_core::standalone::{self, FlattenReport, MapQuality};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
@@ -8,9 +10,8 @@ use crate::errors::Failure;
 use crate::job::Job;
 use crate::owned_array::{Array, Reduced};
 use crate::report;
-use crate::settings::{self, Function};
+use crate::settings;
 use crate::unwrap::MeshArrays;
-use crate::words::Words;
 
 /// A patch in the plane, before and after its stretch was minimised.
 ///

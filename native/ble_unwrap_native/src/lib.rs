@@ -16,7 +16,6 @@ mod place;
 mod report;
 mod settings;
 mod unwrap;
-mod words;
 
 /// Automatic UV unwrapping under a stretch bound, by Bernoulli logistic embedding.
 ///

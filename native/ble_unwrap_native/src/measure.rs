@@ -1,6 +1,7 @@
 //! `measure`.
 
 use ble_unwrap_core::metrics::Texture;
+use ble_unwrap_core::settings::Function;
 use ble_unwrap_core::standalone::measure_layout;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -9,7 +10,7 @@ use crate::arrays::{self, Argument};
 use crate::errors::Failure;
 use crate::job::Job;
 use crate::report;
-use crate::settings::{self, Function};
+use crate::settings;
 use crate::unwrap::MeshArrays;
 
 /// Measure the quality of a UV map, whoever made it.

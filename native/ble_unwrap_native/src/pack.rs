@@ -1,5 +1,6 @@
 //! `pack`.
 
+use ble_unwrap_core::settings::Function;
 use ble_unwrap_core::standalone::repack;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -8,7 +9,7 @@ use crate::arrays::{self, Argument};
 use crate::errors::Failure;
 use crate::job::Job;
 use crate::owned_array::{Array, Reduced};
-use crate::settings::{self, Function};
+use crate::settings;
 
 /// Charts in their new places.
 ///

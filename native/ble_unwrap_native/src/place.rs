@@ -1,6 +1,8 @@
 //! `place`: further points among landmarks that are plain arrays.
 
+use ble_unwrap_core::Choice;
 use ble_unwrap_core::embedding::{self, Evidence, FittedLandmarks, Model};
+use ble_unwrap_core::settings::Function;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -8,7 +10,7 @@ use crate::arrays::{self, Argument};
 use crate::errors::{Failure, InvalidArgumentError};
 use crate::job::Job;
 use crate::owned_array::Array;
-use crate::settings::{self, Function};
+use crate::settings;
 
 /// Place points among fitted landmarks by their distances or affinities to them.
 ///
@@ -80,10 +82,8 @@ pub(crate) fn place(
 ) -> PyResult<Py<PyAny>> {
     let call = settings::from_keywords(settings, Function::Place)?;
     let model = call.settings.embedding.model;
-    let mut evidence = Evidence::SquaredDistances;
-    if let Some(given) = kind {
-        settings::set_word("kind", &mut evidence, given)?;
-    }
+    let kinds = [("distances", Evidence::SquaredDistances), ("affinities", Evidence::Affinities)];
+    let evidence = kind.map_or(Ok(Evidence::SquaredDistances), |given| settings::one_of("kind", &kinds, given))?;
     let sigma = sigma.map_or(Ok(1.0), |given| settings::positive("sigma", given, ""))?;
     let truncation = truncation.map_or(Ok(0.0), |given| settings::number("truncation", given))?;
     let (data, m, columns) = arrays::real_matrix(data, Argument { name: "data", shape: "(m, k)" })?;
@@ -130,6 +130,6 @@ fn one_a_landmark(
     if values.len() == expected {
         return Ok(values);
     }
-    let (found, model) = (values.len(), crate::words::Words::word(&model));
+    let (found, model) = (values.len(), model.word());
     Err(InvalidArgumentError::new_err(format!("{name}: expected {expected} values for model='{model}', found {found}")))
 }

@@ -1,6 +1,7 @@
 //! `unwrap` and `submit_unwrap`: arrays in, atlas out.
 
 use ble_unwrap_core::MeshInput;
+use ble_unwrap_core::settings::Function;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -9,7 +10,7 @@ use crate::errors::Failure;
 use crate::job::Job;
 use crate::owned_array::{Array, Reduced};
 use crate::report;
-use crate::settings::{self, Function};
+use crate::settings;
 
 /// UVs of a mesh, and what is known about them.
 ///
@@ -141,71 +142,7 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 ///     Edges that borders of charts follow where a border is needed, such as sharp edges and borders of materials.
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
-/// preset : {"default", "paper", "iso_charts"}
-///     Where settings that are not given come from. ``"paper"``: the published method as printed; ``"iso_charts"``: the same
-///     with Isomap, which the paper compares itself with.
-/// stretch_limit : float, above 1
-///     Upper bound of the L2 stretch. 1 is isometric; the default is 1.1.
-/// limit_over : {"chart", "atlas"}
-///     What the limit bounds: the stretch of every chart, or as in UVAtlas the root of the area-weighted mean of the
-///     charts' squared stretch. Single charts may then have up to four times as much above 1.
-/// weld : bool
-///     Whether vertices at the same position count as one. Only the charts see it; the mesh stays as it is.
-/// weld_distance : float, at least 0, or None
-///     How near to each other such vertices are, in the unit of ``positions``: 0 for exactly the same coordinates, ``None``
-///     for what single precision cannot tell apart, which is 2**-21 of the diagonal of the bounding box or, if all
-///     coordinates are numbers of single precision, of the greatest of them where that is larger; at most a hundredth of
-///     the mean length of a side. All that is welded lies within the
-///     distance around one vertex, so chains are broken up, and no two vertices of one face are welded unless they coincide.
-/// coarse : bool
-///     Whether large pieces of surface are cut into charts on a coarse mesh first, which is many times faster.
-/// merge : bool
-///     Whether charts are joined again where their union stays under the limit, and crushed polygons at their borders
-///     handed over.
-/// least_sewn : float, 0 to 1000
-///     Charts are sewn along a part of their border, the rest left as a dart, where that is at least this share of the
-///     square root of the smaller one's area. Less for fewer charts, more for compact ones, 1000 for no darts
-///     of any kind, no nets and nothing handed over.
-/// holes : {"keep", "cut"}
-///     Whether charts may have holes or are cut to disks.
-/// chart_scale : {"uniform", "stretch"}
-///     The same texel density for all charts, or more for stretched ones.
-/// crease_weight : float, 0 to 2
-///     How strongly borders are drawn to creases: 0 not at all, 1 by default.
-/// seed : int
-///     Seed of every random choice.
-/// geodesics : {"fast_marching", "dijkstra"}
-///     How distances on the surface are measured.
-/// landmark_fraction, landmark_min, landmark_max : float, int, int or None
-///     Number of landmarks of a piece of surface: this share of its vertices, within these bounds.
-/// together_max : int
-///     Pieces of at most so many vertices are embedded with all their vertices together, as in the paper, at a cost of
-///     their square; larger ones by their landmarks. 0, the default: always by landmarks; 2,000 in the paper's presets.
-/// model : {"default", "paper", "isomap"}
-///     How landmarks are embedded in the plane: Bernoulli logistic embedding with intercepts, the model as printed, or
-///     classical scaling of geodesic distances.
-/// kernel_width : float or None
-///     Width of the affinity kernel over the mean squared distance; ``None`` for the model's own.
-/// relaxation : float, above 0 and below 2
-///     Over-relaxation of the embedding's updates.
-/// max_sweeps, tolerance : int, float
-///     The embedding ends after so many sweeps, or when the likelihood changes by less than this share.
-/// update : {"serial", "parallel"}
-///     Order of the embedding's updates; serial ones never lower the likelihood.
-/// initial : {"mds", "random"}
-///     Start of the embedding.
-/// stretch_solver : {"newton", "line_search"}
-///     How stretch is minimised: projected Newton steps or the line searches of Sander et al.
-/// stretch_iterations : int
-///     Most iterations of that.
-/// margin : float
-///     Least distance between charts, in texels of ``texture_size``.
-/// texture_size : int or two ints
-///     Width and height of the texture in texels. UVs of a texture that is not square are stretched to the unit square.
-/// rotation : {"any", "quarter", "none"}
-///     How charts may be turned in packing.
-/// threads : int
-///     Threads to work with; 0 for as many as the machine has. The result does not depend on it.
+#[doc = include_str!("settings.txt")]
 ///
 /// Returns
 /// -------
@@ -237,6 +174,13 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 /// charts keep the margin, each chart is under ``chart_limit`` or counted in ``charts_over_limit`` (a single face may not
 /// flatten under it); ``l2`` is under ``atlas_limit`` or a warning says so. The result is the same, bit for bit, for any number of threads. Not guaranteed: the fewest charts
 /// or the shortest seams.
+///
+/// ``limit_over="atlas"`` bounds the root of the area-weighted mean of the charts' squared L2 stretch, as in UVAtlas.
+///
+/// Single precision cannot tell apart what is nearer than 2**-21 of the diagonal of the bounding box or, if all coordinates
+/// are numbers of single precision, of the greatest of them where that is larger; a ``weld_distance`` of ``None`` is that,
+/// but at most a hundredth of the mean length of a side, and 0 welds exactly the same coordinates only. All that is welded
+/// lies within the distance around one vertex, so chains are broken up.
 ///
 /// The arrays are copied before work begins; other Python threads run meanwhile. Ctrl-C raises ``KeyboardInterrupt``.
 /// Time is near-linear in the number of faces.

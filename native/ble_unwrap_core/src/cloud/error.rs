@@ -5,6 +5,7 @@ use thiserror::Error;
 use crate::error::UnwrapError;
 use crate::packing::PackError;
 use crate::progress::Cancelled;
+use crate::settings::NEIGHBOURS;
 
 /// Why there is no atlas of a point cloud. The text names the offending element and the remedy.
 #[derive(Debug, Error)]
@@ -13,7 +14,7 @@ pub enum CloudError {
     #[error(transparent)]
     Setting(UnwrapError),
     /// Too few or too many neighbours.
-    #[error("neighbours is {value}; it must be from {} to {}", super::LEAST_NEIGHBOURS, super::MOST_NEIGHBOURS)]
+    #[error("neighbours is {value}; it must be from {} to {}", NEIGHBOURS.range[0], NEIGHBOURS.range[1])]
     Neighbours {
         /// What was given.
         value: usize,

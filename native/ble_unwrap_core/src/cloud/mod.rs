@@ -49,7 +49,7 @@ use rayon::prelude::*;
 use crate::clock::Clock;
 use crate::progress::{Cancelled, Progress, Stage};
 use crate::report::counted;
-use crate::settings::Settings;
+use crate::settings::{NEIGHBOURS, Settings};
 
 pub use atlas::{CloudReport, PointAtlas, PointDefect};
 pub use error::CloudError;
@@ -62,12 +62,6 @@ use neighbourhood::{Neighbourhood, subgraph};
 use piece::PieceCharts;
 use sample::Sample;
 
-/// Graph distances are then 3 % too long on average, which relaxation takes away; the paper names no number.
-pub const DEFAULT_NEIGHBOURS: usize = 12;
-/// Fewer do not tell a tangent plane.
-pub const LEAST_NEIGHBOURS: usize = 4;
-/// More do not fit in memory for the clouds that would need them.
-pub const MOST_NEIGHBOURS: usize = 256;
 /// Indices are 32 bits, one value of which stands for "none".
 const MOST_POINTS: usize = (1 << 31) - 1;
 /// Charts under this share of the surface do not count as the worst.
@@ -106,7 +100,8 @@ pub fn unwrap_points(
 ) -> Result<PointAtlas, CloudError> {
     progress.check()?;
     settings.validate().map_err(CloudError::Setting)?;
-    if !(LEAST_NEIGHBOURS..=MOST_NEIGHBOURS).contains(&neighbours) {
+    let [least, most] = NEIGHBOURS.range;
+    if !(least..=most).contains(&neighbours) {
         return Err(CloudError::Neighbours { value: neighbours });
     }
     if positions.len() > MOST_POINTS {

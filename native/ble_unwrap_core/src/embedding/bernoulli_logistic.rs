@@ -21,6 +21,7 @@
 
 use rayon::prelude::*;
 
+use crate::choice::choices;
 use crate::progress::Cancelled;
 use crate::progress::Progress;
 
@@ -46,6 +47,11 @@ pub enum Update {
     /// All at once from the last sweep: τ = t. A step that lowers F is retried with half of ω.
     Parallel,
 }
+
+choices!(Update {
+    Serial: "serial", "Serial", "Points move one after another, and the likelihood rises at every step.";
+    Parallel: "parallel", "Parallel", "All points move at once from the same state, which needs a relaxation below 1.";
+});
 
 /// Parameters of [`fit`].
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,5 +1,7 @@
 //! Parameters of the embedding, with the presets of practice and of the paper.
 
+use crate::choice::choices;
+
 use super::affinity::{Kernel, KernelWidth};
 use super::bernoulli_logistic::{FitOptions, LogitModel, Update};
 use super::error::EmbeddingError;
@@ -19,9 +21,15 @@ pub enum Model {
     /// Bernoulli logistic embedding as printed: no intercepts, Gaussian kernel. Folds even flat sheets: of the
     /// triangles of a square of 1,000 vertices it flips 8 %, of a 3:1 rectangle half.
     Paper,
-    /// Classical scaling of geodesic distances, for comparison.
+    /// Classical scaling, which fits no likelihood.
     Isomap,
 }
+
+choices!(Model {
+    Default: "default", "Extended", "Bernoulli logistic embedding with intercepts and logistic affinity.";
+    Paper: "paper", "As Printed", "Bernoulli logistic embedding as in the paper: Gaussian affinity, no intercepts.";
+    Isomap: "isomap", "Isomap", "Classical scaling of geodesic distances, for comparison.";
+});
 
 impl Model {
     pub(super) fn kernel(self) -> Kernel {
@@ -40,6 +48,11 @@ pub enum Initial {
     /// Normal with deviation ½ in each coordinate, from the seed.
     Random,
 }
+
+choices!(Initial {
+    Mds: "mds", "Classical Scaling", "Multidimensional scaling of the landmarks, which needs the fewest sweeps.";
+    Random: "random", "Random", "Normally distributed points, drawn from the seed.";
+});
 
 /// Parameters of [`embed_chart`](super::embed_chart) and [`embed`](super::embed()).
 #[derive(Clone, Debug, PartialEq)]

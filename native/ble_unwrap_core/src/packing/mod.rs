@@ -58,6 +58,7 @@ use nalgebra::{Point2, Vector2};
 use rayon::prelude::*;
 use thiserror::Error;
 
+use crate::choice::choices;
 use crate::progress::{Cancelled, Progress};
 use outline::Outline;
 
@@ -71,6 +72,12 @@ pub enum Rotation {
     /// The given pose only.
     None,
 }
+
+choices!(Rotation {
+    Any: "any", "Any", "Charts are turned by any angle, which packs tightest.";
+    Quarter: "quarter", "Quarter Turns", "Charts are turned by multiples of 90° from how they were flattened, not set upright.";
+    None: "none", "None", "Charts stay as they were flattened, at whatever angle that is.";
+});
 
 /// How long to search for a dense placement. Neither looks at a clock: work is counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -12,7 +12,7 @@ use crate::error::UnwrapError;
 use crate::mesh::{self, ConditionOptions, FaceId, Groups, MeshInput, Surface};
 use crate::packing::PackSettings;
 use crate::progress::{Cancelled, Progress, Stage};
-use crate::settings::{self, ChartScale, LimitOver, Settings};
+use crate::settings::{ChartScale, LimitOver, Settings};
 
 use super::memo::{self, Fingerprint, Kind, Memo, Run};
 use super::tally::Tally;
@@ -47,7 +47,8 @@ impl Analysis {
         progress: &Progress,
     ) -> Result<Self, UnwrapError> {
         progress.check()?;
-        settings::check_weld_distance(conditioning.weld_distance)?;
+        let ConditionOptions { weld, weld_distance } = *conditioning;
+        Settings { weld, weld_distance, ..Settings::default() }.validate()?;
         progress.enter(Stage::Condition);
         let prepared = Prepared::new(input, conditioning, progress)?;
         Ok(Self {
@@ -83,11 +84,12 @@ impl Analysis {
         if settings.weld != made_with.weld {
             let value = settings.weld.to_string();
             let allowed = if made_with.weld { "true, as in the analysis" } else { "false, as in the analysis" };
-            return Err(UnwrapError::Setting { name: "weld", value, allowed });
+            return Err(UnwrapError::Setting { name: "weld", value, allowed: allowed.into() });
         }
         if settings.weld && settings.weld_distance != made_with.weld_distance {
             let value = settings.weld_distance.map_or_else(|| "not given".into(), |d| d.to_string());
-            return Err(UnwrapError::Setting { name: "weld_distance", value, allowed: "what it was in the analysis" });
+            let allowed = "what it was in the analysis".into();
+            return Err(UnwrapError::Setting { name: "weld_distance", value, allowed });
         }
         let input = MeshInput {
             positions: &self.positions,

@@ -10,9 +10,13 @@ const HARD: f64 = 50.0;
 /// A part unrolls if the angle defects at its inner vertices, but for the largest, which is the apex of a cone, add up to at most
 /// so many radians: a dome of so much curvature is stretched by 1.002 in the plane.
 const MOST_CURVED: f64 = 0.5;
+/// Parts have at least so many polygons in the mean: of fewer they are the facets of a crystal or of crumpled paper, and which of
+/// them belong together is better told by distances.
+const LEAST_POLYGONS: usize = 4;
+
 /// Divides a patch along its hard edges where these enclose parts that unroll without stretch and make up at least a share of
 /// its area; what else there is stays together as far as it is connected. `None` where the patch is not such a thing, and where
-/// guides run inside it: they say where it is to be cut. O(n).
+/// guides run inside it: they say where it is to be cut. O(n log n).
 pub(crate) fn between_hard_edges(mesh: &TriMesh, polygon: &[u32], least_share: f64) -> Option<Segmentation> {
     if mesh.has_guides() {
         return None;
@@ -24,7 +28,10 @@ pub(crate) fn between_hard_edges(mesh: &TriMesh, polygon: &[u32], least_share: f
         polygon[f.index()] != polygon[g.index()] && normals[f.index()].dot(&normals[g.index()]) <= least
     };
     let (smooth, parts) = connected(mesh, |h| !is_hard(h));
-    if parts < 2 {
+    let mut polygons = polygon.to_vec();
+    polygons.sort_unstable();
+    polygons.dedup();
+    if parts < 2 || parts * LEAST_POLYGONS > polygons.len() {
         return None;
     }
     let unrolls = unrolling(mesh, &smooth, parts);
@@ -158,13 +165,16 @@ mod tests {
     fn a_cone_and_its_base_are_two_and_a_box_is_six() {
         let (cone, polygon) = turned(32, &[[1.0, 0.0], [0.5, 1.0], [0.01, 2.0]]);
         assert_eq!(parts(&cone, &polygon), Some(3), "base, wall and the small flat top");
-        let cube = test_surfaces::cubes([1, 1, 1], |_| true);
+        let cube = test_surfaces::cubes([3, 3, 3], |_| true);
         let polygon: Vec<u32> = (0..cube.face_count() as u32).map(|f| f / 2).collect();
         assert_eq!(parts(&cube, &polygon), Some(6));
     }
 
     #[test]
-    fn what_is_round_is_left_alone() {
+    fn what_is_round_or_made_of_facets_is_left_alone() {
+        let cube = test_surfaces::cubes([1, 1, 1], |_| true);
+        let polygon: Vec<u32> = (0..cube.face_count() as u32).map(|f| f / 2).collect();
+        assert_eq!(parts(&cube, &polygon), None);
         let ball = test_surfaces::sphere(3);
         let polygon: Vec<u32> = (0..ball.face_count() as u32).collect();
         assert_eq!(parts(&ball, &polygon), None);

@@ -57,6 +57,7 @@ pub use stitch::stitch;
 pub use tutte::{TutteBoundary, tutte_embedding};
 pub use unbend::{Unbent, unbend};
 
+use crate::choice::choices;
 use crate::distortion::RestTriangle;
 use crate::linalg::SparseError;
 use crate::mesh::{FaceId, TriMesh, VertexId};
@@ -70,6 +71,11 @@ pub enum Solver {
     /// One vertex at a time along random lines, as in the paper.
     LineSearch,
 }
+
+choices!(Solver {
+    Newton: "newton", "Newton", "Projected Newton steps, which are fast.";
+    LineSearch: "line_search", "Line Search", "One vertex at a time along random directions, as in the paper.";
+});
 
 /// Settings of [`minimise_stretch`].
 #[derive(Clone, Debug, PartialEq)]

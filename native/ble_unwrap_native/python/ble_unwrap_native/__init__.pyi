@@ -51,80 +51,171 @@ class UnprovenError(BleUnwrapError):
 
 class InternalError(BleUnwrapError): ...
 
+# made by `make settings`
 @type_check_only
-class _Threads(TypedDict, total=False):
+class _CallSettings(TypedDict, total=False):
     preset: Literal["default", "paper", "iso_charts"]
+    """Where the values of settings come from that are not given. "default": Extended model, fast solvers: least stretch and fewest charts. "paper": The published method as printed: slower, more charts. "iso_charts": The same with Isomap, the method the paper compares itself with."""
     threads: int
+    """Processor threads to work with; 0 takes all that the machine has. The result does not depend on it."""
 
 @type_check_only
-class _PlaceSettings(_Threads, total=False):
-    model: Literal["default", "paper", "isomap"]
-
-@type_check_only
-class _GeodesicSettings(_Threads, total=False):
-    geodesics: Literal["fast_marching", "dijkstra"]
-
-@type_check_only
-class _FitSettings(_Threads, total=False):
-    seed: int
-    model: Literal["default", "paper", "isomap"]
-    kernel_width: float | None
-    relaxation: float
-    max_sweeps: int
-    tolerance: float
-    update: Literal["serial", "parallel"]
-
-@type_check_only
-class _EmbeddingSettings(_FitSettings, total=False):
-    initial: Literal["mds", "random"]
-
-@type_check_only
-class _WeldSettings(TypedDict, total=False):
-    weld: bool
-    weld_distance: float | None
-
-@type_check_only
-class _TextureSettings(_Threads, total=False):
-    margin: float
-    texture_size: int | Sequence[int]
-
-@type_check_only
-class _MeasureSettings(_TextureSettings, _WeldSettings, total=False): ...
-
-@type_check_only
-class _PackSettings(_TextureSettings, total=False):
-    rotation: Literal["any", "quarter", "none"]
-
-@type_check_only
-class _CloudSettings(_EmbeddingSettings, _PackSettings, total=False):
-    stretch_limit: float
-    coarse: bool
-    landmark_fraction: float
-    landmark_min: int
-    landmark_max: int | None
-
-@type_check_only
-class _FlattenSettings(_GeodesicSettings, _EmbeddingSettings, _WeldSettings, total=False):
-    landmark_fraction: float
-    landmark_min: int
-    landmark_max: int | None
-    together_max: int
-    stretch_solver: Literal["newton", "line_search"]
-    stretch_iterations: int
-
-@type_check_only
-class _Settings(_FlattenSettings, _PackSettings, total=False):
-    stretch_limit: float
+class _ChartsGroup(TypedDict, total=False):
     limit_over: Literal["chart", "atlas"]
-    coarse: bool
+    """What the limit bounds. "chart": No chart is stretched beyond the limit. "atlas": All charts together keep the limit, while some exceed it, up to fourfold above 1: fewer charts."""
     merge: bool
+    """Joins neighbouring charts again where their union stays within the stretch limit."""
     least_sewn: float
+    """Two charts are sewn along a part of their border, the rest of which stays open as a dart, if that part is at least this long beside the width of the smaller one. Less gives fewer charts, more gives compact ones, the most makes no darts."""
     holes: Literal["keep", "cut"]
+    """What happens to charts with holes. "keep": A chart may have holes, and other charts may be packed into them. "cut": Every chart is cut open to a disk."""
     chart_scale: Literal["uniform", "stretch"]
+    """How large charts are beside each other. "uniform": The same texel density everywhere. "stretch": More pixels where a chart is stretched, between half and double."""
     crease_weight: float
+    """How strongly borders are drawn to folds of the surface; 0 looks at their length alone."""
 
 @type_check_only
-class _AnalyseSettings(_Threads, _WeldSettings, total=False): ...
+class _LimitGroup(TypedDict, total=False):
+    stretch_limit: float
+    """No chart may have a larger L2 stretch than this; 1 is none. Lower values give less distortion and more seams."""
+    coarse: bool
+    """Decides on a coarse copy where to cut large pieces of surface, which is many times faster."""
+
+@type_check_only
+class _WeldGroup(TypedDict, total=False):
+    weld: bool
+    """Lets charts run across vertices at the same place, which imported files often have. The mesh itself stays as it is."""
+    weld_distance: float | None
+    """How near to each other vertices are that are welded. Two vertices of one face never are, unless they coincide. None stands for what single precision cannot tell apart."""
+
+@type_check_only
+class _GeodesicsGroup(TypedDict, total=False):
+    geodesics: Literal["fast_marching", "dijkstra"]
+    """How distances along the surface are measured. "fast_marching": Wave fronts run across the triangles: accurate. "dijkstra": Shortest paths run along the edges: some 6 % too long, but faster."""
+
+@type_check_only
+class _LandmarksGroup(TypedDict, total=False):
+    landmark_fraction: float
+    """Share of a chart's vertices that serve as landmarks of its embedding."""
+    landmark_min: int
+    """Fewest landmarks of a chart, where it has as many vertices."""
+    landmark_max: int | None
+    """Most landmarks of a chart. None stands for no limit."""
+
+@type_check_only
+class _ModelGroup(TypedDict, total=False):
+    model: Literal["default", "paper", "isomap"]
+    """How a chart is laid out in the plane before its stretch is minimised. "default": Bernoulli logistic embedding with intercepts and logistic affinity. "paper": Bernoulli logistic embedding as in the paper: Gaussian affinity, no intercepts. "isomap": Classical scaling of geodesic distances, for comparison."""
+
+@type_check_only
+class _FitGroup(TypedDict, total=False):
+    seed: int
+    """Start of all random choices. The same seed gives the same result on any machine."""
+    kernel_width: float | None
+    """Width of the affinity as a multiple of the mean squared distance; useful from 0.1 to 0.3. None stands for the model's own."""
+    relaxation: float
+    """Over-relaxation of the sweeps. Within this range the likelihood never falls."""
+    max_sweeps: int
+    """Most sweeps of the embedding over all points."""
+    tolerance: float
+    """The sweeps stop when one changes the likelihood by less than this share of it."""
+    update: Literal["serial", "parallel"]
+    """The order in which points move in a sweep. "serial": Points move one after another, and the likelihood rises at every step. "parallel": All points move at once from the same state, which needs a relaxation below 1."""
+
+@type_check_only
+class _StartGroup(TypedDict, total=False):
+    initial: Literal["mds", "random"]
+    """Where the embedding starts from. "mds": Multidimensional scaling of the landmarks, which needs the fewest sweeps. "random": Normally distributed points, drawn from the seed."""
+
+@type_check_only
+class _FlatteningGroup(TypedDict, total=False):
+    together_max: int
+    """Charts of at most so many vertices are embedded with all their vertices together, as in the paper, at a cost of the square of their number; larger ones by their landmarks."""
+    stretch_solver: Literal["newton", "line_search"]
+    """How the stretch of a chart is minimised. "newton": Projected Newton steps, which are fast. "line_search": One vertex at a time along random directions, as in the paper."""
+    stretch_iterations: int
+    """Most iterations of the stretch solver."""
+
+@type_check_only
+class _TextureGroup(TypedDict, total=False):
+    margin: float
+    """Least distance between two charts, in texels, the pixels of the texture; half of it is kept to the border."""
+    texture_size: int | Sequence[int]
+    """Width and height, in texels, of the texture that the UVs are meant for: its proportions and, for the margin, its resolution."""
+
+@type_check_only
+class _PackingGroup(TypedDict, total=False):
+    rotation: Literal["any", "quarter", "none"]
+    """How charts may be turned to pack them tighter. "any": Charts are turned by any angle, which packs tightest. "quarter": Charts are turned by multiples of 90° from how they were flattened, not set upright. "none": Charts stay as they were flattened, at whatever angle that is."""
+
+@type_check_only
+class _UnwrapSettings(
+    _CallSettings,
+    _ChartsGroup,
+    _LimitGroup,
+    _WeldGroup,
+    _GeodesicsGroup,
+    _LandmarksGroup,
+    _ModelGroup,
+    _FitGroup,
+    _StartGroup,
+    _FlatteningGroup,
+    _TextureGroup,
+    _PackingGroup,
+    total=False,
+): ...
+
+@type_check_only
+class _AnalyseSettings(_CallSettings, _WeldGroup, total=False): ...
+
+@type_check_only
+class _UnwrapPointsSettings(
+    _CallSettings,
+    _LimitGroup,
+    _LandmarksGroup,
+    _ModelGroup,
+    _FitGroup,
+    _StartGroup,
+    _TextureGroup,
+    _PackingGroup,
+    total=False,
+): ...
+
+@type_check_only
+class _EmbedSettings(_CallSettings, _ModelGroup, _FitGroup, total=False): ...
+
+@type_check_only
+class _FlattenSettings(
+    _CallSettings,
+    _WeldGroup,
+    _GeodesicsGroup,
+    _LandmarksGroup,
+    _ModelGroup,
+    _FitGroup,
+    _StartGroup,
+    _FlatteningGroup,
+    total=False,
+): ...
+
+@type_check_only
+class _TransformSettings(_CallSettings, total=False): ...
+
+@type_check_only
+class _PlaceSettings(_CallSettings, _ModelGroup, total=False): ...
+
+@type_check_only
+class _GeodesicDistancesSettings(_CallSettings, _GeodesicsGroup, total=False): ...
+
+@type_check_only
+class _GraphDistancesSettings(_CallSettings, total=False): ...
+
+@type_check_only
+class _MeasureSettings(_CallSettings, _WeldGroup, _TextureGroup, total=False): ...
+
+@type_check_only
+class _PackSettings(_CallSettings, _TextureGroup, _PackingGroup, total=False): ...
+
+# end of what `make settings` makes
 
 @final
 class Analysis:
@@ -132,8 +223,8 @@ class Analysis:
     def weld(self) -> bool: ...
     @property
     def weld_distance(self) -> float | None: ...
-    def unwrap(self, *, job: Job | None = None, **settings: Unpack[_Settings]) -> Atlas: ...
-    def submit_unwrap(self, *, job: Job | None = None, **settings: Unpack[_Settings]) -> Job: ...
+    def unwrap(self, *, job: Job | None = None, **settings: Unpack[_UnwrapSettings]) -> Atlas: ...
+    def submit_unwrap(self, *, job: Job | None = None, **settings: Unpack[_UnwrapSettings]) -> Job: ...
 
 @final
 class Array(Buffer):
@@ -168,7 +259,7 @@ class Embedding:
     def intercepts(self) -> Array: ...
     @property
     def report(self) -> dict[str, Any]: ...
-    def transform(self, data: Buffer, *, job: Job | None = None, **settings: Unpack[_Threads]) -> Array: ...
+    def transform(self, data: Buffer, *, job: Job | None = None, **settings: Unpack[_TransformSettings]) -> Array: ...
 
 @final
 class Flattening:
@@ -222,7 +313,7 @@ def unwrap(
     seams: Buffer | None = None,
     guides: Buffer | None = None,
     job: Job | None = None,
-    **settings: Unpack[_Settings],
+    **settings: Unpack[_UnwrapSettings],
 ) -> Atlas: ...
 def submit_unwrap(
     positions: Buffer,
@@ -233,7 +324,7 @@ def submit_unwrap(
     seams: Buffer | None = None,
     guides: Buffer | None = None,
     job: Job | None = None,
-    **settings: Unpack[_Settings],
+    **settings: Unpack[_UnwrapSettings],
 ) -> Job: ...
 def analyse(
     positions: Buffer,
@@ -251,14 +342,14 @@ def unwrap_points(
     *,
     neighbours: int = 12,
     job: Job | None = None,
-    **settings: Unpack[_CloudSettings],
+    **settings: Unpack[_UnwrapPointsSettings],
 ) -> PointAtlas: ...
 def submit_unwrap_points(
     positions: Buffer,
     *,
     neighbours: int = 12,
     job: Job | None = None,
-    **settings: Unpack[_CloudSettings],
+    **settings: Unpack[_UnwrapPointsSettings],
 ) -> Job: ...
 def embed(
     data: Buffer,
@@ -273,7 +364,7 @@ def embed(
     sigma: float | None = None,
     truncation: float = 0.0,
     job: Job | None = None,
-    **settings: Unpack[_FitSettings],
+    **settings: Unpack[_EmbedSettings],
 ) -> Embedding: ...
 def flatten(
     positions: Buffer,
@@ -293,7 +384,7 @@ def geodesic_distances(
     *,
     corner_triangles: Buffer | None = None,
     job: Job | None = None,
-    **settings: Unpack[_GeodesicSettings],
+    **settings: Unpack[_GeodesicDistancesSettings],
 ) -> Array: ...
 def graph_distances(
     points: Buffer,
@@ -303,7 +394,7 @@ def graph_distances(
     connect: Literal["error", "bridge", "separate"] = "error",
     radius: float | None = None,
     job: Job | None = None,
-    **settings: Unpack[_Threads],
+    **settings: Unpack[_GraphDistancesSettings],
 ) -> Array: ...
 def measure(
     positions: Buffer,

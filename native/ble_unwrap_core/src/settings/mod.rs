@@ -1,0 +1,415 @@
+//! Every parameter of the unwrapper, with the presets of practice, of the paper and of the method it is compared with.
+//!
+//! A setting is written in two places: its default (and what presets have instead) where its structure is, and all else,
+//! such as its range and what people are told about it, in the [`TABLE`].
+
+mod interval;
+mod table;
+
+pub use interval::Interval;
+pub use table::{Argument, Function, Group, Kind, NEIGHBOURS, Place, Setting, TABLE, THREADS, Value, listed};
+
+use crate::choice::choices;
+use crate::embedding::{EmbeddingSettings, Model};
+use crate::error::UnwrapError;
+use crate::geodesics::GeodesicSettings;
+use crate::mesh::ConditionOptions;
+use crate::packing::PackSettings;
+use crate::segmentation::SegmentationSettings;
+use crate::stretch::StretchSettings;
+
+/// Patches of more vertices are embedded by landmarks in the presets of the paper, too. All distances of m vertices
+/// take some 20 m² bytes and 0.4 µs a pair (marching, sweeps): 80 MB and 1.5 s at 2,000, twice the paper's own face of
+/// "around 1,000 vertices"; every patch that is tried costs that again.
+const PAPER_TOGETHER_MAX: usize = 2_000;
+
+/// Most vertices of a patch whose distances to each other can be handled: 8 GB and minutes.
+pub(crate) const MOST_TOGETHER: usize = 20_000;
+
+/// The value of [`Settings::least_sewn`] that keeps charts without darts.
+pub const NEVER_SEWN: f64 = 1e3;
+
+/// What happens to the holes of a chart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Holes {
+    /// A chart may have several boundary loops.
+    Keep,
+    /// Every chart is cut to a topological disk, as the paper has it.
+    Cut,
+}
+
+choices!(Holes {
+    Keep: "keep", "Keep", "A chart may have holes, and other charts may be packed into them.";
+    Cut: "cut", "Cut", "Every chart is cut open to a disk.";
+});
+
+/// How charts are scaled relative to each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChartScale {
+    /// The same area of texture for the same area of surface.
+    Uniform,
+    /// More texture for stretched charts: √(E/A) of each chart, within [½, 2] of uniform.
+    Stretch,
+}
+
+choices!(ChartScale {
+    Uniform: "uniform", "Uniform", "The same texel density everywhere.";
+    Stretch: "stretch", "By Stretch", "More pixels where a chart is stretched, between half and double.";
+});
+
+/// What the stretch limit bounds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LimitOver {
+    /// The L2 stretch of every chart.
+    Chart,
+    /// The L2 stretch of the whole atlas, as UVAtlas has it: the root of the area-weighted mean of the charts' squared L2
+    /// stretch. Single charts may have more, up to [`Settings::chart_limit`].
+    Atlas,
+}
+
+choices!(LimitOver {
+    Chart: "chart", "Each Chart", "No chart is stretched beyond the limit.";
+    Atlas: "atlas", "Whole Atlas", "All charts together keep the limit, while some exceed it, up to fourfold above 1: fewer charts.";
+});
+
+/// Where the settings that are not given come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preset {
+    /// [`Settings::default`].
+    Default,
+    /// [`Settings::paper`].
+    Paper,
+    /// [`Settings::iso_charts`].
+    IsoCharts,
+}
+
+choices!(Preset {
+    Default: "default", "Default", "Extended model, fast solvers: least stretch and fewest charts.";
+    Paper: "paper", "Paper", "The published method as printed: slower, more charts.";
+    IsoCharts: "iso_charts", "Iso-charts", "The same with Isomap, the method the paper compares itself with.";
+});
+
+/// A limit over the atlas lets single charts stretch so many times more above 1.
+const SINGLE_CHARTS: f64 = 4.0;
+
+/// All settings of [`unwrap`](crate::unwrap()), grouped by stage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Upper bound of the L2 stretch, above 1.
+    pub stretch_limit: f64,
+    /// Of what: of every chart, or of all together.
+    pub limit_over: LimitOver,
+    /// Whether vertices at the same position count as one. Off by default: an edge between two
+    /// vertices of the input is then a seam only if the result says so. Turn it on for data that
+    /// repeats vertices along seams of its own, as many file formats do.
+    pub weld: bool,
+    /// How near to each other such vertices are, in the unit of the input; `None` for what single precision cannot tell
+    /// apart. See [`ConditionOptions::weld_distance`].
+    pub weld_distance: Option<f64>,
+    /// Whether large components are cut on a coarse mesh first. Off, as in the paper's presets, patches are embedded by all
+    /// landmarks and ribbons stay whole, too.
+    pub coarse: bool,
+    /// Whether neighbouring charts are joined again where their union stays under the limit, and crushed polygons at their
+    /// borders handed over.
+    pub merge: bool,
+    /// Charts whose union would be over the limit are sewn along a part of their border, the rest being left as a dart,
+    /// where that part is at least this share of the square root of the smaller one's area: less for fewer charts and a
+    /// shorter seam, more for compact charts. From [`NEVER_SEWN`] on none are, nor are patches cut by darts or to
+    /// nets before they are split, nor crushed polygons handed over borders.
+    pub least_sewn: f64,
+    /// Holes of charts.
+    pub holes: Holes,
+    /// Relative scale of charts.
+    pub chart_scale: ChartScale,
+    /// Patches of at most so many vertices are embedded with all their vertices together, as the paper does, in
+    /// time and memory of the square of their number; larger ones by their landmarks. 0: always by landmarks.
+    pub together_max: usize,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// Landmarks and geodesic distances.
+    pub geodesics: GeodesicSettings,
+    /// Spectral analysis and cutting.
+    pub segmentation: SegmentationSettings,
+    /// Bernoulli logistic embedding.
+    pub embedding: EmbeddingSettings,
+    /// Stretch minimisation.
+    pub stretch: StretchSettings,
+    /// Packing.
+    pub packing: PackSettings,
+}
+
+impl Default for Settings {
+    /// What an artist wants: the extended model, projected Newton, holes kept.
+    fn default() -> Self {
+        Self {
+            stretch_limit: 1.1,
+            limit_over: LimitOver::Chart,
+            weld: false,
+            weld_distance: None,
+            coarse: true,
+            merge: true,
+            least_sewn: 0.2,
+            holes: Holes::Keep,
+            chart_scale: ChartScale::Uniform,
+            together_max: 0,
+            seed: 0,
+            geodesics: GeodesicSettings::default(),
+            segmentation: SegmentationSettings::default(),
+            embedding: EmbeddingSettings::default(),
+            stretch: StretchSettings::default(),
+            packing: PackSettings::default(),
+        }
+    }
+}
+
+impl Settings {
+    /// The paper as printed: landmarks, one vertex in a hundred, for cutting (section 5.1); its model from a random
+    /// start on all vertices of a patch together; Sander's line searches, disks, two texels at 1024.
+    ///
+    /// Above 2,000 vertices a patch is embedded by its landmarks, and the others are placed by regression: all pairs would
+    /// not fit in time and memory.
+    #[must_use]
+    pub fn paper() -> Self {
+        Self {
+            holes: Holes::Cut,
+            coarse: false,
+            least_sewn: NEVER_SEWN,
+            segmentation: SegmentationSettings::paper(),
+            together_max: PAPER_TOGETHER_MAX,
+            geodesics: GeodesicSettings::paper(),
+            embedding: EmbeddingSettings::paper(),
+            stretch: StretchSettings::paper(),
+            packing: PackSettings::paper(),
+            ..Self::default()
+        }
+    }
+
+    /// What the paper is compared with: iso-charts (Zhou, Snyder, Guo, Shum 2004), the same pipeline and settings as
+    /// [`Settings::paper`] with Isomap in place of Bernoulli logistic embedding.
+    #[must_use]
+    pub fn iso_charts() -> Self {
+        let paper = Self::paper();
+        Self { embedding: EmbeddingSettings { model: Model::Isomap, ..paper.embedding.clone() }, ..paper }
+    }
+}
+
+impl Settings {
+    /// Whether charts may be cut open by darts, to nets, or have polygons handed over their borders: [`Settings::least_sewn`]
+    /// is below [`NEVER_SEWN`].
+    pub(crate) fn wants_darts(&self) -> bool {
+        self.least_sewn < NEVER_SEWN
+    }
+
+    /// What a mesh is conditioned with.
+    #[must_use]
+    pub fn conditioning(&self) -> ConditionOptions {
+        ConditionOptions { weld: self.weld, weld_distance: self.weld_distance }
+    }
+
+    /// The L2 stretch that a single chart may have: the limit, or where that is over the atlas 1 and four times what the
+    /// limit is above 1.
+    #[must_use]
+    pub fn chart_limit(&self) -> f64 {
+        match self.limit_over {
+            LimitOver::Chart => self.stretch_limit,
+            LimitOver::Atlas => 1.0 + SINGLE_CHARTS * (self.stretch_limit - 1.0),
+        }
+    }
+
+    /// The settings of a preset.
+    #[must_use]
+    pub fn of(preset: Preset) -> Self {
+        match preset {
+            Preset::Default => Self::default(),
+            Preset::Paper => Self::paper(),
+            Preset::IsoCharts => Self::iso_charts(),
+        }
+    }
+
+    /// Checks every range of the [`TABLE`], those of the settings that only Rust has, and that no two contradict each other.
+    ///
+    /// # Errors
+    /// [`UnwrapError::Setting`] with the first setting that is out of range.
+    pub fn validate(&self) -> Result<(), UnwrapError> {
+        let refused = |name, value: String, allowed| Err(UnwrapError::Setting { name, value, allowed });
+        let mut taken = Self::default();
+        for setting in TABLE {
+            let value = setting.value(self);
+            if !setting.set(&mut taken, value) {
+                return refused(setting.name, value.to_string(), setting.expected());
+            }
+        }
+        let GeodesicSettings { landmark_min, landmark_max, .. } = self.geodesics;
+        if landmark_max < landmark_min {
+            return refused(
+                "landmark_max",
+                landmark_max.to_string(),
+                format!("at least landmark_min, which is {landmark_min}"),
+            );
+        }
+        let s = &self.segmentation;
+        for (name, parts) in [("first_parts", s.first_parts), ("later_parts", s.later_parts)] {
+            if parts < 2 {
+                return refused(name, parts.to_string(), "at least 2".into());
+            }
+        }
+        let share = Interval::closed(0.0, 1.0);
+        for (name, value) in [("band", s.band), ("crease_share", s.crease_share)] {
+            if !share.contains(value) {
+                return refused(name, value.to_string(), format!("a number {share}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_are_valid_and_iso_charts_differs_from_the_paper_in_its_model_only() {
+        for settings in [Settings::default(), Settings::paper(), Settings::iso_charts()] {
+            assert!(settings.validate().is_ok());
+        }
+        let mut settings = Settings::iso_charts();
+        assert_eq!(settings.embedding.model, Model::Isomap);
+        settings.embedding.model = Model::Paper;
+        assert_eq!(settings, Settings::paper());
+    }
+
+    /// The name and the range in the error that some settings give.
+    fn refused(settings: &Settings) -> (&'static str, String) {
+        match settings.validate() {
+            Err(UnwrapError::Setting { name, allowed, .. }) => (name, allowed),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// A value at each end of a setting's range, or next to it where the end is left out, and values just outside.
+    fn at_the_ends(setting: &Setting) -> (Vec<Value<'static>>, Vec<Value<'static>>) {
+        let real = |range: Interval| {
+            let inside = [
+                if range.least_open { range.least.next_up() } else { range.least },
+                if range.most_open { range.most.next_down() } else { range.most },
+            ];
+            let outside = [inside[0].next_down(), inside[1].next_up(), f64::NAN];
+            (inside.map(Value::Real).to_vec(), outside.map(Value::Real).to_vec())
+        };
+        let whole = |[least, most]: [u64; 2]| {
+            let outside = [least.checked_sub(1), most.checked_add(1)];
+            (vec![Value::Whole(least), Value::Whole(most)], outside.into_iter().flatten().map(Value::Whole).collect())
+        };
+        match setting.kind {
+            Kind::Flag(_) => (vec![Value::Flag(false), Value::Flag(true)], vec![]),
+            Kind::Real(_, range) => real(range),
+            Kind::OptionalReal(_, range, _) => {
+                let (inside, outside) = real(range);
+                ([inside, vec![Value::None]].concat(), outside)
+            }
+            Kind::Whole(_, range) => whole(range.map(|n| n as u64)),
+            Kind::Limit(_, range) => {
+                let (inside, outside) = whole(range.map(|n| n as u64));
+                ([inside, vec![Value::None]].concat(), outside)
+            }
+            Kind::Seed(_) => whole([0, u64::MAX]),
+            Kind::Size(_, [least, most]) => {
+                let [least, most] = [u64::from(least), u64::from(most)];
+                let outside = [[least - 1, most], [most, most + 1]].map(Value::Size);
+                (vec![Value::Size([least, most]), Value::Size([most, least])], outside.to_vec())
+            }
+            Kind::Choice(place) => {
+                let words = place(&mut Settings::default()).all().iter().map(|value| Value::Word(value.word));
+                (words.collect(), vec![Value::Word("unheard of")])
+            }
+        }
+    }
+
+    /// Puts a value where a setting lies, whether it is in range or not.
+    fn force(setting: &Setting, settings: &mut Settings, value: Value<'_>) {
+        match (setting.kind, value) {
+            (Kind::Real(place, _), Value::Real(x)) => *place(settings) = x,
+            (Kind::OptionalReal(place, ..), Value::Real(x)) => *place(settings) = Some(x),
+            (Kind::Whole(place, _) | Kind::Limit(place, _), Value::Whole(n)) => *place(settings) = n as usize,
+            (Kind::Size(places, _), Value::Size(sides)) => {
+                places(settings).into_iter().zip(sides).for_each(|(place, side)| *place = side as u32);
+            }
+            (Kind::Choice(_), Value::Word(_)) => {} // no such value can be written
+            (kind, value) => panic!("{kind:?} {value:?}"),
+        }
+    }
+
+    #[test]
+    fn every_range_is_kept_at_its_ends_and_just_outside() {
+        for setting in TABLE {
+            let (inside, outside) = at_the_ends(setting);
+            for value in inside {
+                let mut settings = Settings::default();
+                assert!(setting.set(&mut settings, value), "{} {value}", setting.name);
+                assert_eq!(setting.value(&settings), value, "{}", setting.name);
+                // Bounds of landmarks that contradict each other are refused for that.
+                settings.geodesics.landmark_max = settings.geodesics.landmark_max.max(settings.geodesics.landmark_min);
+                assert!(settings.validate().is_ok(), "{} {value}", setting.name);
+                assert_eq!(settings.embedding.validate(), Ok(()), "the stage itself takes {} {value}", setting.name);
+            }
+            for value in outside {
+                let mut settings = Settings::default();
+                assert!(!setting.set(&mut settings, value), "{} {value}", setting.name);
+                assert_eq!(settings, Settings::default(), "{} {value}: nothing is changed", setting.name);
+                force(setting, &mut settings, value);
+                if settings != Settings::default() {
+                    assert_eq!(refused(&settings), (setting.name, setting.expected()), "{value}");
+                }
+            }
+            assert!(!setting.set(&mut Settings::default(), Value::Word("unheard of")), "{}", setting.name);
+        }
+    }
+
+    #[test]
+    fn settings_that_contradict_each_other_and_those_of_rust_alone_are_checked() {
+        let mut settings = Settings::default();
+        settings.geodesics.landmark_max = settings.geodesics.landmark_min - 1;
+        assert_eq!(refused(&settings), ("landmark_max", "at least landmark_min, which is 48".into()));
+        let wrong: [fn(&mut SegmentationSettings); 4] =
+            [|s| s.first_parts = 1, |s| s.later_parts = 0, |s| s.band = 1.5, |s| s.crease_share = f64::NAN];
+        for (change, name) in wrong.into_iter().zip(["first_parts", "later_parts", "band", "crease_share"]) {
+            let mut settings = Settings::default();
+            change(&mut settings.segmentation);
+            assert_eq!(refused(&settings).0, name);
+        }
+    }
+
+    #[test]
+    fn everything_in_the_table_is_told_in_sentences_and_once() {
+        let mut names: Vec<&str> = TABLE.iter().map(|setting| setting.name).collect();
+        names.extend([NEIGHBOURS.name, THREADS.name]);
+        let mut sentences: Vec<&str> = TABLE.iter().map(|setting| setting.sentence).collect();
+        sentences.extend([NEIGHBOURS.sentence, THREADS.sentence]);
+        for setting in TABLE {
+            if let Kind::Choice(place) = setting.kind {
+                sentences.extend(place(&mut Settings::default()).all().iter().map(|value| value.sentence));
+            }
+        }
+        for list in [names, sentences] {
+            let count = list.len();
+            let distinct: std::collections::BTreeSet<&str> = list.into_iter().collect();
+            assert_eq!(distinct.len(), count);
+            assert!(distinct.iter().all(|text| !text.contains("  ")), "{distinct:?}");
+        }
+        for sentence in TABLE.iter().map(|setting| setting.sentence) {
+            assert!(sentence.ends_with('.') && sentence.starts_with(char::is_uppercase), "{sentence}");
+        }
+        assert_eq!(listed(&["a"]), "'a'");
+        assert_eq!(listed(&["a", "b", "c"]), "'a', 'b' or 'c'");
+    }
+
+    #[test]
+    fn a_function_takes_its_groups_and_unwrap_takes_all() {
+        for group in Group::ALL {
+            assert!(group.concerns(Function::Unwrap));
+            assert!(!group.concerns(Function::GraphDistances) && !group.concerns(Function::Transform));
+            assert!(TABLE.iter().any(|setting| setting.group == group), "{group:?} is not empty");
+        }
+        assert!(Group::Weld.concerns(Function::Measure) && !Group::Weld.concerns(Function::UnwrapPoints));
+    }
+}
