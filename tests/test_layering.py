@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "native/ble_unwrap_core/src"
 
-FOUNDATION = {"choice", "memory", "progress", "linalg", "mesh"}
+FOUNDATION = {"choice", "memory", "predicates", "progress", "rounds", "linalg", "mesh"}
 TOOLS = FOUNDATION | {"geodesics", "distortion"}
 # In the order of the pipeline. A stage sees the types that earlier stages put out, never their functions.
 STAGES = ["segmentation", "charts", "embedding", "stretch", "packing"]
@@ -28,8 +28,10 @@ MAY_USE = {
     "choice": set(),
     "memory": set(),
     "progress": {"memory"},
+    "predicates": set(),
+    "rounds": {"progress"},
     "linalg": {"memory", "progress"},
-    "mesh": {"memory", "progress"},
+    "mesh": {"memory", "predicates", "progress"},
     "geodesics": FOUNDATION,
     "distortion": FOUNDATION,
     **dict.fromkeys(STAGES, TOOLS),

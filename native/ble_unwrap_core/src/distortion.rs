@@ -129,8 +129,14 @@ pub fn singular_values(j: &Matrix2<f64>) -> [f64; 2] {
 #[inline]
 #[must_use]
 pub fn squared_stretch(j: &Matrix2<f64>) -> f64 {
-    let det = j.determinant();
-    0.5 * j.norm_squared() / (det * det)
+    squared_stretch_of(j.norm_squared(), j.determinant())
+}
+
+/// The same of |J|² and det J.
+#[inline]
+#[must_use]
+pub fn squared_stretch_of(norm_squared: f64, determinant: f64) -> f64 {
+    0.5 * norm_squared / (determinant * determinant)
 }
 
 /// Twice the signed area of a triangle in the plane.

@@ -1,13 +1,13 @@
 //! A piece to charts: flatten, or split and flatten the parts, until all lie under the limit.
 
 use nalgebra::Point2;
-use rayon::prelude::*;
 
 use crate::progress::{Cancelled, Progress};
+use crate::rounds::{self, Outcome};
 use crate::segmentation::SpectralAnalysis;
 use crate::settings::Settings;
 
-use super::flatten::{Flat, Outcome, flatten, landmark_distances};
+use super::flatten::{Flat, Outcome as Flattened, flatten, landmark_distances};
 use super::neighbourhood::subgraph;
 use super::sample::Sample;
 use super::split;
@@ -64,11 +64,6 @@ struct Open {
     splits: u32,
 }
 
-enum Step {
-    Accept(NodeChart, History),
-    Split(Vec<Vec<u32>>, &'static str),
-}
-
 /// Charts of the given connected parts of a sample, sorted by lowest node, each under the limit or too small to be cut.
 ///
 /// Rounds over all open parts, in parallel; a part is split in two or more of fewer nodes, so there are at most as many
@@ -81,38 +76,23 @@ pub(super) fn chart(
     done: &(dyn Fn(usize) + Sync),
     progress: &Progress,
 ) -> Result<Charting, Cancelled> {
-    let mut open: Vec<Open> = parts.into_iter().map(|nodes| Open { nodes, splits: 0 }).collect();
-    let mut charting = Charting::default();
-    while !open.is_empty() {
-        // The largest first, so that no long part starts last.
-        open.sort_by_key(|o| (std::cmp::Reverse(o.nodes.len()), o.nodes.first().copied()));
-        let steps: Vec<Result<Step, Cancelled>> = open
-            .par_iter()
-            .with_max_len(1)
-            .map_init(Vec::new, |local: &mut Vec<u32>, part| {
-                local.resize(sample.len(), u32::MAX);
-                let outcome = step(sample, part, local, limit, settings, progress)?;
-                if matches!(outcome, Step::Accept(..)) {
-                    done(part.nodes.len());
-                }
-                Ok(outcome)
-            })
-            .collect();
-        let mut next = Vec::new();
-        for (part, step) in open.iter().zip(steps) {
-            match step? {
-                Step::Accept(chart, history) => {
-                    charting.charts.push(chart);
-                    charting.history.add(&history);
-                }
-                Step::Split(parts, rung) => {
-                    charting.history.take(rung, 1);
-                    next.extend(parts.into_iter().map(|nodes| Open { nodes, splits: part.splits + 1 }));
-                }
+    let open = parts.into_iter().map(|nodes| Open { nodes, splits: 0 }).collect();
+    let rounds = rounds::until_made(
+        open,
+        |o: &Open| (std::cmp::Reverse(o.nodes.len()), o.nodes.first().copied()),
+        Vec::new,
+        |part, local: &mut Vec<u32>| {
+            local.resize(sample.len(), u32::MAX);
+            let (outcome, history) = step(sample, part, local, limit, settings, progress)?;
+            if matches!(outcome, Outcome::Made(_)) {
+                done(part.nodes.len());
             }
-        }
-        open = next;
-    }
+            Ok((outcome, history))
+        },
+    )?;
+    let mut charting = Charting::default();
+    rounds.notes.iter().for_each(|history| charting.history.add(history));
+    charting.charts = rounds.made.into_iter().map(|(chart, _)| chart).collect();
     charting.charts.sort_by_key(|c| c.nodes.first().copied());
     Ok(charting)
 }
@@ -139,25 +119,30 @@ fn step(
     limit: f64,
     settings: &Settings,
     progress: &Progress,
-) -> Result<Step, Cancelled> {
+) -> Result<(Outcome<NodeChart, Open>, History), Cancelled> {
     progress.check()?;
     let graph = subgraph(&sample.graph, &part.nodes, local);
     let own = sample.part(&part.nodes, graph);
     let seed = settings.seed ^ u64::from(part.nodes.first().copied().unwrap_or(0));
     let (parts, rung) = match flatten(&own, limit, seed, settings, progress)? {
-        Outcome::Flat(flat) => {
+        Flattened::Flat(flat) => {
             let history = History::of(&flat);
             let chart = NodeChart { nodes: part.nodes.clone(), uv: flat.uv };
-            return Ok(Step::Accept(chart, history));
+            return Ok((Outcome::Made(chart), history));
         }
-        Outcome::Split(distances, analysis) if part.splits < MOST_SPECTRAL_SPLITS => {
+        Flattened::Split(distances, analysis) if part.splits < MOST_SPECTRAL_SPLITS => {
             match split::spectral_parts(&own.graph, &distances, &analysis)? {
                 Some(parts) => (parts, "split"),
                 None => (split::halves(&own.graph), "halve"),
             }
         }
-        Outcome::Split(..) | Outcome::Halve => (split::halves(&own.graph), "halve"),
+        Flattened::Split(..) | Flattened::Halve => (split::halves(&own.graph), "halve"),
     };
-    let global = |nodes: Vec<u32>| nodes.into_iter().map(|v| part.nodes[v as usize]).collect();
-    Ok(Step::Split(parts.into_iter().map(global).collect(), rung))
+    let global = |nodes: Vec<u32>| Open {
+        nodes: nodes.into_iter().map(|v| part.nodes[v as usize]).collect(),
+        splits: part.splits + 1,
+    };
+    let mut history = History::default();
+    history.take(rung, 1);
+    Ok((Outcome::Divided(parts.into_iter().map(global).collect()), history))
 }

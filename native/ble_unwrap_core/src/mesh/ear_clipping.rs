@@ -4,9 +4,9 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use nalgebra::{Point3, Vector3};
-use robust::{Coord, orient2d};
 
 use super::measure::area_vector;
+use crate::predicates::orientation;
 use crate::progress::{Cancelled, Progress};
 
 /// Most point-in-triangle tests for one polygon (half a second). What is left is then fanned out.
@@ -46,7 +46,7 @@ pub(super) fn clip_ears(
 /// The part of a polygon that is not yet clipped.
 struct Clipper<'a> {
     points: &'a [Point3<f64>],
-    flat: Vec<Coord<f64>>,
+    flat: Vec<[f64; 2]>,
     prev: Vec<u32>,
     next: Vec<u32>,
     clipped: Vec<bool>,
@@ -97,7 +97,7 @@ impl<'a> Clipper<'a> {
     /// Positive where the outline turns left.
     fn turn(&self, corner: usize) -> f64 {
         let [a, b, c] = self.ear(corner).map(|i| self.flat[i]);
-        orient2d(a, b, c)
+        orientation(a, b, c)
     }
 
     /// The rank of an ear: flat ones last, then the shortest diagonal.
@@ -137,8 +137,8 @@ impl<'a> Clipper<'a> {
         self.tests += self.reflex.len();
         !self.reflex.iter().any(|&r| {
             let p = self.flat[r as usize];
-            let corner_of_ear = ear.contains(&(r as usize)) || [a, b, c].iter().any(|q| p.x == q.x && p.y == q.y);
-            !corner_of_ear && orient2d(a, b, p) >= 0.0 && orient2d(b, c, p) >= 0.0 && orient2d(c, a, p) >= 0.0
+            let corner_of_ear = ear.contains(&(r as usize)) || [a, b, c].iter().any(|q| p == *q);
+            !corner_of_ear && orientation(a, b, p) >= 0.0 && orientation(b, c, p) >= 0.0 && orientation(c, a, p) >= 0.0
         })
     }
 
@@ -194,7 +194,7 @@ impl<'a> Clipper<'a> {
 const WARP: f64 = 1e-6;
 
 /// The outline seen from the side on which it runs counter-clockwise.
-fn project(points: &[Point3<f64>]) -> Vec<Coord<f64>> {
+fn project(points: &[Point3<f64>]) -> Vec<[f64; 2]> {
     let origin = points[0];
     let normal: Vector3<f64> =
         points.windows(2).map(|w| (w[0] - origin).cross(&(w[1] - origin))).fold(Vector3::zeros(), |sum, n| sum + n);
@@ -213,16 +213,16 @@ fn project(points: &[Point3<f64>]) -> Vec<Coord<f64>> {
     }
     let u = unit((axis + 1) % 3).cross(&direction).normalize();
     let v = direction.cross(&u);
-    points.iter().map(|p| p - origin).map(|p| Coord { x: p.dot(&u), y: p.dot(&v) }).collect()
+    points.iter().map(|p| p - origin).map(|p| [p.dot(&u), p.dot(&v)]).collect()
 }
 
 /// The outline along a coordinate axis, from its positive side or from behind.
-fn drop_axis(points: &[Point3<f64>], axis: usize, behind: bool) -> Vec<Coord<f64>> {
+fn drop_axis(points: &[Point3<f64>], axis: usize, behind: bool) -> Vec<[f64; 2]> {
     let (mut u, mut v) = ((axis + 1) % 3, (axis + 2) % 3);
     if behind {
         (u, v) = (v, u);
     }
-    points.iter().map(|p| Coord { x: p[u], y: p[v] }).collect()
+    points.iter().map(|p| [p[u], p[v]]).collect()
 }
 
 #[cfg(test)]

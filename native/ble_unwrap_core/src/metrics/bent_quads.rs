@@ -1,9 +1,9 @@
 //! Quads that are convex on the surface and not in UV.
 
 use nalgebra::Point3;
-use robust::{Coord, orient2d};
 
 use crate::mesh::{MeshInput, is_convex};
+use crate::predicates::orientation;
 
 /// The quads of a mesh that are [convex](is_convex) on the surface and bent in UV: neither all four corners turn left nor all
 /// four right, by an exact test. By one of its two diagonals such a quad is drawn with a triangle turned over.
@@ -31,8 +31,8 @@ fn is_bent(uv: [[f32; 2]; 4]) -> bool {
     if !uv.iter().flatten().all(|x| x.is_finite()) {
         return false;
     }
-    let coord = uv.map(|p| Coord { x: f64::from(p[0]), y: f64::from(p[1]) });
-    let turn = |k: usize| orient2d(coord[k], coord[(k + 1) % 4], coord[(k + 2) % 4]);
+    let uv = uv.map(|p| p.map(f64::from));
+    let turn = |k: usize| orientation(uv[k], uv[(k + 1) % 4], uv[(k + 2) % 4]);
     !((0..4).all(|k| turn(k) > 0.0) || (0..4).all(|k| turn(k) < 0.0))
 }
 

@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 
 use nalgebra::Point2;
-use robust::{Coord, orient2d};
 
 use super::{PackError, PackItem};
+use crate::predicates::orientation;
 
 /// The union of an item's triangles as a 1-chain.
 ///
@@ -66,9 +66,8 @@ impl Outline {
         let mut half = Vec::with_capacity(3 * item.triangles.len());
         for corners in item.triangles {
             let p = corners.map(|c| item.points[c as usize]);
-            let at = p.map(|p| Point2::from((p - centre) / unit));
-            let coord = at.map(|p| Coord { x: p.x, y: p.y });
-            let turn = orient2d(coord[0], coord[1], coord[2]);
+            let [a, b, c] = p.map(|p| Point2::from((p - centre) / unit));
+            let turn = orientation(a, b, c);
             area += 0.5 * turn.abs();
             for k in 0..3 {
                 let (a, b) = (corners[k], corners[(k + 1) % 3]);

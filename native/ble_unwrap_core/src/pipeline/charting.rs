@@ -5,12 +5,11 @@ use std::cell::{LazyCell, OnceCell};
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use crate::charts::{self, Chart, Patch};
 use crate::geodesics::LandmarkDistances;
 use crate::mesh::{FaceId, Topology, VertexId};
 use crate::progress::Cancelled;
+use crate::rounds::{self, Outcome};
 use crate::segmentation::{self, Segmentation, SpectralAnalysis};
 use crate::settings::{Holes, Settings};
 
@@ -58,8 +57,8 @@ pub(super) struct Charting {
 pub(super) struct Refused(HashSet<Fingerprint>);
 
 impl Refused {
-    pub(super) fn add(&mut self, patch: &Patch) {
-        self.0.insert(Self::key(&patch.faces));
+    pub(super) fn of(keys: impl Iterator<Item = Fingerprint>) -> Self {
+        Self(keys.collect())
     }
 
     pub(super) fn contains(&self, faces: &[FaceId]) -> bool {
@@ -67,7 +66,7 @@ impl Refused {
     }
 
     /// For faces in ascending order, as patches have them that were never sewn.
-    fn key(faces: &[FaceId]) -> Fingerprint {
+    pub(super) fn key(faces: &[FaceId]) -> Fingerprint {
         let mut key = Fingerprint::new();
         key.indices(faces.iter().map(|f| f.index()));
         key
@@ -77,14 +76,8 @@ impl Refused {
 struct Piece {
     patch: Patch,
     splits: u32,
-    family: Option<u32>,
     /// Distances taken over from the patch it was split from.
     inherited: Option<LandmarkDistances>,
-}
-
-enum Step {
-    Accept(Box<Chart>),
-    Split(Vec<(Patch, Option<LandmarkDistances>)>),
 }
 
 /// Cuts and flattens patches until every chart is under the limit. Rounds over all open pieces, in
@@ -97,68 +90,53 @@ pub(super) fn chart(
     done: &(dyn Fn(f64) + Sync),
     progress: &Run<'_>,
 ) -> Result<Charting, Cancelled> {
-    let whole = |patch| Piece { patch, splits: 0, family: None, inherited: None };
-    let mut open: Vec<Piece> = patches.into_iter().map(whole).collect();
-    let mut accepted: Vec<(Chart, Option<u32>)> = Vec::new();
-    let mut rungs = Rungs::default();
-    let mut refused = Refused::default();
-    let mut split_count = 0;
-    while !open.is_empty() {
-        // The largest first, so that no long piece starts last.
-        open.sort_by_key(|p| (std::cmp::Reverse(p.patch.faces.len()), p.patch.faces[0]));
-        let steps: Vec<Result<(Step, Rungs), Cancelled>> = open
-            .par_iter()
-            .with_max_len(1)
-            .map(|piece| {
-                let outcome = step(piece, settings, progress)?;
-                if matches!(outcome.0, Step::Accept(_)) {
+    let pieces = patches.into_iter().map(|patch| Piece { patch, splits: 0, inherited: None }).collect();
+    let rounds = rounds::until_made(
+        pieces,
+        |p| (std::cmp::Reverse(p.patch.faces.len()), p.patch.faces[0]),
+        || (),
+        |piece, ()| {
+            let mut rungs = Rungs::default();
+            let outcome = step(piece, settings, &mut rungs, progress)?;
+            let refused = match &outcome {
+                Outcome::Made(_) => {
                     done(piece.patch.faces.len() as f64);
+                    None
                 }
-                Ok(outcome)
-            })
-            .collect();
-        let mut next = Vec::new();
-        for (piece, taken) in open.iter().zip(steps) {
-            let (outcome, steps) = taken?;
-            rungs.add(&steps);
-            match outcome {
-                Step::Accept(chart) => {
-                    accepted.push((*chart, piece.family));
-                }
-                Step::Split(parts) => {
-                    refused.add(&piece.patch);
-                    let splits = piece.splits + 1;
-                    let halves = parts.len() == 2;
-                    for (patch, inherited) in parts {
-                        next.push(Piece { patch, splits, family: Some(split_count), inherited });
-                        split_count += u32::from(!halves);
-                    }
-                    split_count += 1;
-                }
-            }
-        }
-        open = next;
-    }
-    accepted.sort_by_key(|(c, _)| c.patch.faces[0]);
-    let (charts, family) = accepted.into_iter().unzip();
+                Outcome::Divided(_) => Some(Refused::key(&piece.patch.faces)),
+            };
+            Ok((outcome, (rungs, refused)))
+        },
+    )?;
+    let mut rungs = Rungs::default();
+    rounds.notes.iter().for_each(|(steps, _)| rungs.add(steps));
+    let refused = Refused::of(rounds.notes.into_iter().filter_map(|(_, key)| key));
+    let mut made = rounds.made;
+    made.sort_by_key(|(c, _)| c.patch.faces[0]);
+    let (charts, family) = made.into_iter().unzip();
     Ok(Charting { charts, family, rungs, refused })
 }
 
-fn step(piece: &Piece, settings: &Settings, progress: &Run<'_>) -> Result<(Step, Rungs), Cancelled> {
+fn step(
+    piece: &Piece,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    progress: &Run<'_>,
+) -> Result<Outcome<Chart, Piece>, Cancelled> {
     progress.check()?;
     let (patch, splits) = (&piece.patch, piece.splits);
-    let mut rungs = Rungs::default();
     let attempt = Attempt::new(patch, piece.inherited.as_ref(), settings, progress);
     if patch.is_one_polygon() {
-        let chart = attempt.polygon(&mut rungs)?;
-        return Ok((Step::Accept(Box::new(chart)), rungs));
+        return Ok(Outcome::Made(attempt.polygon(rungs)?));
     }
-    if let Some(chart) = attempt.run(&mut rungs)? {
-        return Ok((Step::Accept(Box::new(chart)), rungs));
+    if let Some(chart) = attempt.run(rungs)? {
+        return Ok(Outcome::Made(chart));
     }
-    let parts = attempt.split(splits, &mut rungs)?;
-    let inherited: Vec<_> = parts.iter().map(|part| attempt.heritage(part)).collect();
-    Ok((Step::Split(parts.into_iter().zip(inherited).collect()), rungs))
+    let part = |patch| {
+        let inherited = attempt.heritage(&patch);
+        Piece { patch, splits: splits + 1, inherited }
+    };
+    Ok(Outcome::Divided(attempt.split(splits, rungs)?.into_iter().map(part).collect()))
 }
 
 /// The parts of a patch between its hard edges, if those that unroll have at least a share of its area, and not in the paper's

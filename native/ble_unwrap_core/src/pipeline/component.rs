@@ -8,11 +8,10 @@
 use std::cmp::Reverse;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use crate::charts::{Chart, Patch};
 use crate::mesh::{self, Coarse, FaceId, Groups, HalfedgeId, TriMesh};
 use crate::progress::Cancelled;
+use crate::rounds::{self, Outcome};
 use crate::segmentation::{self, Segmentation};
 use crate::settings::Settings;
 
@@ -163,8 +162,6 @@ struct Part {
     number: usize,
     /// What it was sewn of, to go back to.
     pieces: Vec<Part>,
-    /// The split that it came out of, if any; the same for both halves of one in two, and else for no other.
-    family: Option<u32>,
 }
 
 impl Part {
@@ -175,11 +172,11 @@ impl Part {
     }
 }
 
-enum Outcome {
-    Accept(Box<Chart>),
-    Split(Vec<Part>),
+/// What a part is made into.
+enum Made {
+    Chart(Chart),
     /// To be charted on the fine mesh alone.
-    Fine,
+    Fine(Patch),
 }
 
 /// A fine mesh with its coarse one.
@@ -238,7 +235,7 @@ impl<'a> OnCoarse<'a> {
                 Some(cuts) => {
                     let mut faces: Vec<FaceId> = pieces.iter().flat_map(|p| p.faces.iter().copied()).collect();
                     faces.sort_unstable();
-                    joined.push(Part { faces, cuts, guide: sewn.chart, number: usize::MAX, pieces, family: None });
+                    joined.push(Part { faces, cuts, guide: sewn.chart, number: usize::MAX, pieces });
                 }
                 None => joined.extend(pieces),
             }
@@ -281,7 +278,7 @@ impl<'a> OnCoarse<'a> {
         let part = |faces: &[FaceId]| {
             let number = guide_of(faces);
             let (faces, guide) = (faces.to_vec(), charts[number].clone());
-            Part { faces, cuts: Vec::new(), guide, number, pieces: Vec::new(), family: None }
+            Part { faces, cuts: Vec::new(), guide, number, pieces: Vec::new() }
         };
         let groups = Groups::by_label(&parts.label, parts.parts, |i| patch.faces[i]);
         Ok(groups.iter().map(part).collect())
@@ -296,44 +293,28 @@ impl<'a> OnCoarse<'a> {
         rungs: &mut Rungs,
         progress: &Run<'_>,
     ) -> Result<Charting, Cancelled> {
-        let mut open = parts;
-        let mut rest = Vec::new();
-        let mut accepted: Vec<(Chart, Option<u32>)> = Vec::new();
-        let mut split_count = 0;
-        while !open.is_empty() {
-            open.sort_by_key(|p| (Reverse(p.faces.len()), p.faces[0]));
-            let outcomes: Vec<Result<(Outcome, Rungs), Cancelled>> = open
-                .par_iter()
-                .with_max_len(1)
-                .map(|part| {
-                    let mut rungs = Rungs::default();
-                    let outcome = self.step(part, &mut rungs, progress)?;
-                    if matches!(outcome, Outcome::Accept(_)) {
-                        done(part.faces.len() as f64);
-                    }
-                    Ok((outcome, rungs))
-                })
-                .collect();
-            let mut next = Vec::new();
-            for (part, outcome) in open.into_iter().zip(outcomes) {
-                let (outcome, steps) = outcome?;
-                rungs.add(&steps);
-                match outcome {
-                    Outcome::Accept(chart) => accepted.push((*chart, part.family)),
-                    Outcome::Fine => rest.push(self.fine.part(&part.faces, &part.cuts)),
-                    Outcome::Split(mut parts) => {
-                        let halves = parts.len() == 2;
-                        for part in &mut parts {
-                            part.family = Some(split_count);
-                            split_count += u32::from(!halves);
-                        }
-                        split_count += 1;
-                        next.extend(parts);
-                    }
+        let rounds = rounds::until_made(
+            parts,
+            |p| (Reverse(p.faces.len()), p.faces[0]),
+            || (),
+            |part, ()| {
+                let mut rungs = Rungs::default();
+                let outcome = self.step(part, &mut rungs, progress)?;
+                if matches!(outcome, Outcome::Made(Made::Chart(_))) {
+                    done(part.faces.len() as f64);
                 }
+                Ok((outcome, rungs))
+            },
+        )?;
+        rounds.notes.iter().for_each(|steps| rungs.add(steps));
+        let (mut accepted, mut rest) = (Vec::new(), Vec::new());
+        for (made, family) in rounds.made {
+            match made {
+                Made::Chart(chart) => accepted.push((chart, family)),
+                Made::Fine(patch) => rest.push(patch),
             }
-            open = next;
         }
+        let split_count = rounds.divisions;
         let charting = charting::chart(rest, self.settings, done, progress)?;
         // What is charted anew has not been tried with its neighbours on the coarse mesh either.
         let alone = split_count + charting.family.iter().flatten().max().map_or(0, |most| most + 1);
@@ -349,7 +330,7 @@ impl<'a> OnCoarse<'a> {
         if self.settings.wants_darts() { relief::without_doubled_edges(patch, start) } else { (patch, start) }
     }
 
-    fn step(&self, part: &Part, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Outcome, Cancelled> {
+    fn step(&self, part: &Part, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Outcome<Made, Part>, Cancelled> {
         progress.check()?;
         let done = |h: HalfedgeId| part.is_border(&self.coarse.mesh, h);
         let on_fine = || self.fine.part(&part.faces, &part.cuts);
@@ -358,23 +339,24 @@ impl<'a> OnCoarse<'a> {
             && let Polished::Flat(flat) =
                 flatten::polish(&patch, &start, Rung::Prolonged, self.settings, rungs, progress)?
         {
-            return Ok(Outcome::Accept(Box::new(flat.into_chart(patch))));
+            return Ok(Outcome::Made(Made::Chart(flat.into_chart(patch))));
         }
         if !part.pieces.is_empty() {
-            return Ok(Outcome::Split(part.pieces.clone()));
+            return Ok(Outcome::Divided(part.pieces.clone()));
         }
         let mut faces = part.guide.patch.faces.clone();
         if faces.len() <= LEAST_COARSE_FACES || part.faces.len() <= LEAST_FINE_FACES {
-            return Ok(Outcome::Fine);
+            return Ok(Outcome::Made(Made::Fine(on_fine())));
         }
         faces.sort_unstable();
         let patch = Patch::of_surface(&self.whole.mesh, &self.whole.polygon, faces);
         let patches = charting::split(&patch, &self.strict, rungs, progress)?;
         let charting = charting::chart(patches, &self.strict, &|_| (), progress)?;
         rungs.add(&charting.rungs);
-        let parts = self.prolong_labels(&on_fine(), &charting.charts, progress)?;
+        let patch = on_fine();
+        let parts = self.prolong_labels(&patch, &charting.charts, progress)?;
         // Straightening may have given one label all.
-        Ok(if parts.len() < 2 { Outcome::Fine } else { Outcome::Split(parts) })
+        Ok(if parts.len() < 2 { Outcome::Made(Made::Fine(patch)) } else { Outcome::Divided(parts) })
     }
 }
 

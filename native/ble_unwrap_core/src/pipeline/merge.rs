@@ -342,8 +342,7 @@ mod tests {
         let run = Run::new(&progress, None);
         let all: Vec<FaceId> = mesh.faces().collect();
         let whole = Patch::of_surface(&mesh, &polygon, all);
-        let mut refused = Refused::default();
-        refused.add(&whole);
+        let refused = Refused::of(std::iter::once(Refused::key(&whole.faces)));
         let settings = Settings::default();
         let charting = Charting { charts, family: vec![None, None], rungs: Rungs::default(), refused };
         let (charts, _) = merge(&mesh, &polygon, charting, Which::All, &settings, &run).expect("not cancelled");

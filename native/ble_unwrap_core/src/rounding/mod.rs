@@ -9,10 +9,10 @@
 mod kernel;
 
 use nalgebra::{Point2, Vector2};
-use robust::{Coord, orient2d};
 use thiserror::Error;
 
 use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::predicates::orientation;
 use crate::progress::{Cancelled, Progress};
 
 use kernel::{Constraint, best_point};
@@ -384,8 +384,7 @@ fn step(x: f32, by: i32) -> f32 {
 
 /// Twice the signed area; its sign is exact.
 fn double_area(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> f64 {
-    let coord = |p: [f32; 2]| Coord { x: f64::from(p[0]), y: f64::from(p[1]) };
-    orient2d(coord(a), coord(b), coord(c))
+    orientation(a.map(f64::from), b.map(f64::from), c.map(f64::from))
 }
 
 /// Whether an area makes a triangle; NaN does not.

@@ -2,7 +2,6 @@
 
 use nalgebra::Point2;
 use rayon::prelude::*;
-use robust::{Coord, orient2d};
 use thiserror::Error;
 
 use crate::clock::Clock;
@@ -11,6 +10,7 @@ use crate::error::UnwrapError;
 use crate::flattening::{Rung, Steps};
 use crate::geodesics::{self, LandmarkDistances};
 use crate::mesh::{self, MeshError, MeshInput, Surface, VertexId};
+use crate::predicates::orientation;
 use crate::progress::{Cancelled, Progress, Stage};
 use crate::settings::{MOST_TOGETHER, Settings};
 use crate::stretch::{self, BOUNDARY_REACH, StretchError};
@@ -320,9 +320,8 @@ fn stretch_error(error: StretchError, surface: &Surface) -> FlattenError {
 fn quality(steps: &Steps<'_>, distances: &LandmarkDistances, uv: &[Point2<f64>]) -> MapQuality {
     let mesh = steps.mesh;
     let corners = |f| mesh.triangle(f).map(|v| uv[v.index()]);
-    let coord = |p: Point2<f64>| Coord { x: p.x, y: p.y };
     let turned = |[a, b, c]: [Point2<f64>; 3]| {
-        let sign = orient2d(coord(a), coord(b), coord(c));
+        let sign = orientation(a, b, c);
         sign.is_nan() || sign <= 0.0
     };
     let rest_l_infinity = {

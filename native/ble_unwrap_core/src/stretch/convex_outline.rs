@@ -2,7 +2,7 @@
 
 use nalgebra::{Point2, Vector2};
 
-use super::overlap::orientation;
+use crate::predicates::orientation;
 
 /// Corners of the hull that turn by less than this (in radians) are smoothed away: the arcs that
 /// replace its sides need room to bend.

@@ -12,7 +12,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use crate::distortion::RestTriangle;
+use crate::distortion::{RestTriangle, squared_stretch_of};
 
 /// Derivatives of h(I, d).
 #[derive(Clone, Copy, Debug)]
@@ -57,7 +57,7 @@ impl StretchEnergy {
 
 impl IsotropicEnergy for StretchEnergy {
     fn value(&self, i: f64, d: f64) -> f64 {
-        if d > 0.0 { 0.25 * i / (d * d) + self.area * d + self.dirichlet * i } else { f64::INFINITY }
+        if d > 0.0 { 0.5 * squared_stretch_of(i, d) + self.area * d + self.dirichlet * i } else { f64::INFINITY }
     }
 
     fn derivatives(&self, i: f64, d: f64) -> Derivatives {
@@ -95,7 +95,7 @@ impl PeakEnergy {
 
 impl IsotropicEnergy for PeakEnergy {
     fn value(&self, i: f64, d: f64) -> f64 {
-        let share = 0.5 * i / (d * d) / self.peak;
+        let share = squared_stretch_of(i, d) / self.peak;
         self.plain.value(i, d) + Self::WEIGHT * self.peak / f64::from(Self::POWER) * share.powi(Self::POWER)
     }
 
@@ -104,7 +104,7 @@ impl IsotropicEnergy for PeakEnergy {
         let r2 = r * r;
         // e in I and d, then the power in e.
         let (e_i, e_d, e_id, e_dd) = (0.5 * r2, -i * r2 * r, -r2 * r, 3.0 * i * r2 * r2);
-        let share = 0.5 * i * r2 / self.peak;
+        let share = squared_stretch_of(i, d) / self.peak;
         let slope = Self::WEIGHT * share.powi(Self::POWER - 1);
         let curve = Self::WEIGHT * f64::from(Self::POWER - 1) * share.powi(Self::POWER - 2) / self.peak;
         let plain = self.plain.derivatives(i, d);

@@ -7,10 +7,11 @@
 use nalgebra::{Point2, Vector2};
 
 use super::measure::surface_area;
-use super::overlap::{boundary_is_simple, orientation};
+use super::overlap::boundary_is_simple;
 use super::{MinimiseOptions, Minimised, StretchError, StretchSettings};
-use crate::distortion::RestTriangle;
+use crate::distortion::{RestTriangle, squared_stretch};
 use crate::mesh::{TriMesh, VertexId};
+use crate::predicates::orientation;
 use crate::progress::Progress;
 
 /// Steps of golden section: they narrow the line to 0.618²⁴ ≈ 1e-5 of itself.
@@ -87,7 +88,7 @@ pub(super) fn minimise(
 fn face_sums(rest: &RestTriangle, uv: [Point2<f64>; 3]) -> Sums {
     let j = rest.jacobian(uv);
     let d = j.determinant();
-    let energy = if d > 0.0 { rest.area() * 0.5 * j.norm_squared() / (d * d) } else { f64::INFINITY };
+    let energy = if d > 0.0 { rest.area() * squared_stretch(&j) } else { f64::INFINITY };
     Sums { energy, area: rest.area() * d }
 }
 

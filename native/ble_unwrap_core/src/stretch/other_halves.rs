@@ -3,9 +3,9 @@
 use nalgebra::Point2;
 
 use super::neighbourhood::Neighbourhood;
-use super::overlap::orientation;
 use crate::distortion::{RestTriangle, squared_stretch};
 use crate::mesh::{Quad, TriMesh, VertexId};
+use crate::predicates::orientation;
 
 /// A half that is stretched more than this (squared; 1 is not at all),
 const CROWDED: f64 = 4.0;

@@ -1,17 +1,10 @@
 //! Exact tests that a chart's map is injective: positive triangles and simple boundary loops.
 
 use nalgebra::Point2;
-use robust::{Coord, orient2d};
 
 use super::grid::Grid;
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
-
-/// Sign of the turn a → b → c: positive to the left, exactly zero on a line.
-#[inline]
-pub(super) fn orientation(a: Point2<f64>, b: Point2<f64>, c: Point2<f64>) -> f64 {
-    let coord = |p: Point2<f64>| Coord { x: p.x, y: p.y };
-    orient2d(coord(a), coord(b), coord(c))
-}
+use crate::predicates::orientation;
 
 /// The first face whose triangle is not strictly positive by an exact test, or has a coordinate that
 /// is not finite; `None` if all are positive. O(n).

@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Point2, Vector2};
 
 use super::energy::{HatGradients, IsotropicEnergy, face_derivatives};
 use super::other_halves::OtherHalves;
-use crate::distortion::RestTriangle;
+use crate::distortion::{RestTriangle, squared_stretch_of};
 use crate::linalg::{RoughCholesky, SparseError, SparsePattern};
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 
@@ -96,7 +96,7 @@ impl<'a> ChartFaces<'a> {
         for face in 0..self.triangles.len() {
             let j = self.jacobian(face, uv);
             let d = j.determinant();
-            sums.stretch += self.weights[face] * 0.5 * j.norm_squared() / (d * d);
+            sums.stretch += self.weights[face] * squared_stretch_of(j.norm_squared(), d);
             sums.area += self.weights[face] * d;
         }
         sums

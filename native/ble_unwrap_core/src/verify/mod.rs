@@ -32,9 +32,8 @@ mod nesting;
 
 use std::fmt;
 
-use robust::{Coord, orient2d};
-
 use crate::metrics::{GAP_SEARCH_TEXELS, NONE, OwnedSegment, UvMesh, least_gap};
+use crate::predicates;
 use crate::progress::{Cancelled, Progress};
 
 use boundary::{Boundary, Vertices};
@@ -259,8 +258,7 @@ type Point = [f32; 2];
 
 /// Sign of the area of triangle abc: 1 counter-clockwise, 0 collinear, −1 clockwise. Exact.
 pub(crate) fn orientation(a: Point, b: Point, c: Point) -> i8 {
-    let coord = |p: Point| Coord { x: f64::from(p[0]), y: f64::from(p[1]) };
-    let area = orient2d(coord(a), coord(b), coord(c));
+    let area = predicates::orientation(a.map(f64::from), b.map(f64::from), c.map(f64::from));
     i8::from(area > 0.0) - i8::from(area < 0.0)
 }
 
