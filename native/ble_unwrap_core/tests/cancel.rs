@@ -56,11 +56,36 @@ fn a_large_mesh_stops_at_any_moment() {
     assert!(cancelled_runs(&mesh, moments.into_iter()) >= 6);
 }
 
+/// Cancels as soon as another thread sees a stage; the computation must end soon, with the error.
+fn stops_in(stage: Stage, mesh: &PolyMesh) {
+    let flat = mesh.flat();
+    let progress = Progress::new();
+    thread::scope(|scope| {
+        let run = scope.spawn(|| {
+            let result = unwrap(&input(mesh, &flat), &Settings::default(), &progress);
+            (Instant::now(), result)
+        });
+        while progress.stage() < stage && !run.is_finished() {
+            thread::sleep(Duration::from_micros(50));
+        }
+        assert_eq!(progress.stage(), stage, "it was over before anybody looked: take a larger mesh");
+        progress.cancel();
+        let asked = Instant::now();
+        let (ended, result) = run.join().expect("no panic");
+        assert!(matches!(result, Err(UnwrapError::Cancelled(_))), "{stage:?} went on to the end");
+        let late = ended.saturating_duration_since(asked);
+        assert!(late < PATIENCE, "{late:?} after cancelling in {stage:?}");
+    });
+}
+
 #[test]
-fn packing_and_checking_stop() {
-    let mesh = many_components(20_000);
-    let moments = [10, 30, 60, 100, 150, 200].map(Duration::from_millis);
-    assert!(cancelled_runs(&mesh, moments.into_iter()) >= 1);
+fn each_stage_stops_when_it_is_interrupted() {
+    stops_in(Stage::Condition, &sculpt_like(60_000));
+    stops_in(Stage::Charts, &sculpt_like(20_000));
+    let parts = many_components(20_000);
+    stops_in(Stage::Charts, &parts);
+    stops_in(Stage::Pack, &parts);
+    stops_in(Stage::Verify, &parts);
 }
 
 #[test]

@@ -10,17 +10,27 @@ struct Row {
     name: &'static str,
     /// Fewest and most charts.
     charts: [usize; 2],
-    /// Greatest L2 stretch of the worst chart.
+    /// L2 stretch of the worst chart.
     worst: f64,
-    /// Greatest length of the seams over √area.
+    /// Length of the seams over √area.
     seams: f64,
-    /// Least covered share of the texture.
+    /// Covered share of the texture.
     efficiency: f64,
 }
 
 const fn row(name: &'static str, charts: [usize; 2], worst: f64, seams: f64, efficiency: f64) -> Row {
     Row { name, charts, worst, seams, efficiency }
 }
+
+/// How far a figure may be from its row, either way: what is better than it was is a change to be looked at, too. The worst chart's stretch by
+/// this much,
+const STRETCH: f64 = 1e-4;
+/// and this share of what it is above 1;
+const STRETCH_SHARE: f64 = 0.1;
+/// the length of the seams by this share;
+const SEAM_SHARE: f64 = 0.05;
+/// and the covered share of the texture by this much.
+const EFFICIENCY: f64 = 0.04;
 
 static ROWS: [Row; 17] = [
     row("flat grid", [1, 1], 1.000_001, 0.0, 0.94),
@@ -57,11 +67,12 @@ fn quality_is_what_it_was() {
             ..MeshInput::default()
         };
         let report = unwrap(&input, &Settings::default(), &Progress::new()).expect("unwraps").report;
+        let near = |got: f64, wanted: f64, tolerance: f64| (got - wanted).abs() <= tolerance;
         let good = (row.charts[0]..=row.charts[1]).contains(&report.charts)
             && (report.flips, report.overlaps, report.charts_over_limit.len()) == (0, 0, 0)
-            && report.l2_worst_chart <= row.worst
-            && report.seam_length <= row.seams
-            && report.packing_efficiency >= row.efficiency;
+            && near(report.l2_worst_chart, row.worst, STRETCH + STRETCH_SHARE * (row.worst - 1.0))
+            && near(report.seam_length, row.seams, SEAM_SHARE * row.seams)
+            && near(report.packing_efficiency, row.efficiency, EFFICIENCY);
         if !good {
             moved.push(format!(
                 "{}: {} charts, worst {}, seams {}, efficiency {}, {} flips, {} overlaps, {} over the limit",

@@ -78,6 +78,26 @@ fn prism(sides: usize, [base, top]: [f64; 2], radius: f64, caps: bool, triangles
     if triangles { quads.triangulated() } else { quads }
 }
 
+/// A mesh turned about an axis that is none of the coordinates', and made larger or smaller, in a way of its own for each number.
+fn turned(mesh: PolyMesh, number: u32) -> PolyMesh {
+    let ((s, c), (t, d)) = ((0.7 + f64::from(number)).sin_cos(), (1.9 * f64::from(number)).sin_cos());
+    let size = 10f64.powi(2 * i32::try_from(number).unwrap_or(0) - 5);
+    mesh.moved(|[x, y, z]| {
+        let (x, y) = (c * x - s * y, s * x + c * y);
+        let (y, z) = (d * y - t * z, t * y + d * z);
+        [x, y, z].map(|p| size * p)
+    })
+}
+
+/// A tube of thousands of sides is a wall and two caps like any other, and nothing of it is stretched.
+#[test]
+fn a_tube_of_many_sides_is_as_good_as_one_of_few() {
+    for sides in [12, 5_000] {
+        let tube = unwrapped(&prism(sides, [0.0, 2.0], 1.0, true, false)).report;
+        assert!(tube.charts <= 3 && tube.l2 < 1.001, "{sides} sides: {} charts, {}", tube.charts, tube.l2);
+    }
+}
+
 /// Faces as long as the whole shape: no cut runs along their diagonals, and triangles come out as their quads do.
 #[test]
 fn long_faces_stay_together() {
@@ -92,6 +112,17 @@ fn long_faces_stay_together() {
         let post = unwrapped(&post).report;
         assert!(post.charts <= 6 && post.seam_length <= 10.0, "post of {kind}: {}, {}", post.charts, post.seam_length);
         assert!(post.packing_efficiency >= 0.15, "post of {kind}: {}", post.packing_efficiency);
+    }
+    // However they lie, and at any size: what hangs on the last digit would come out otherwise.
+    for k in 0..6 {
+        for triangles in [false, true] {
+            let post =
+                prism(12, [0.0, 60.0], 1.0, true, triangles).joined(&prism(12, [60.0, 63.0], 1.5, true, triangles));
+            let pin = unwrapped(&turned(prism(24, [0.0, 20.0], 1.0, true, triangles), k)).report;
+            assert!(pin.charts <= 3 && pin.seam_length <= 4.5, "pin {k}: {}, {}", pin.charts, pin.seam_length);
+            let post = unwrapped(&turned(post, k)).report;
+            assert!(post.charts <= 6 && post.seam_length <= 10.0, "post {k}: {}, {}", post.charts, post.seam_length);
+        }
     }
     let plank = PolyMesh {
         positions: vec![[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [8.0, 1.0, 0.0], [0.0, 1.0, 0.0]],

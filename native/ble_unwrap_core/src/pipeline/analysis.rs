@@ -202,3 +202,76 @@ impl Prepared {
         finish::finish(input, surface, charts, rungs, settings, clock, progress)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two unit squares, far apart, as four triangles, the corners of each triangle its own vertices.
+    fn squares() -> (Vec<[f64; 3]>, Vec<i32>, Vec<i32>) {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let positions = [0.0, 5.0].iter().flat_map(|x| corners.map(|c| [c[0] + x, c[1], 0.0])).collect();
+        (positions, (0..12).collect(), (0..=12).step_by(3).collect())
+    }
+
+    fn analysed(conditioning: &ConditionOptions) -> Analysis {
+        let (positions, corner_vertices, face_offsets) = squares();
+        let input = MeshInput {
+            positions: &positions,
+            corner_vertices: &corner_vertices,
+            face_offsets: &face_offsets,
+            ..MeshInput::default()
+        };
+        Analysis::new(&input, conditioning, &Progress::new()).expect("a mesh")
+    }
+
+    #[test]
+    fn it_unwraps_as_a_single_call_does_whatever_went_before() {
+        let (positions, corner_vertices, face_offsets) = squares();
+        let input = MeshInput {
+            positions: &positions,
+            corner_vertices: &corner_vertices,
+            face_offsets: &face_offsets,
+            ..MeshInput::default()
+        };
+        let settings = Settings { weld: true, ..Settings::default() };
+        let once = crate::unwrap(&input, &settings, &Progress::new()).expect("unwraps");
+        let analysis = analysed(&settings.conditioning());
+        assert_eq!((analysis.face_count(), analysis.prepared.components.len()), (4, 2));
+        for other in [settings.clone(), Settings { stretch_limit: 2.0, ..settings.clone() }, settings.clone()] {
+            analysis.unwrap(&other, &Progress::new()).expect("unwraps");
+        }
+        let again = analysis.unwrap(&settings, &Progress::new()).expect("unwraps");
+        assert_eq!((again.uv, again.chart), (once.uv, once.chart));
+    }
+
+    #[test]
+    fn it_refuses_what_it_was_not_made_for_by_name() {
+        let analysis = analysed(&ConditionOptions { weld: true, weld_distance: Some(0.1) });
+        let refused = |settings: Settings| match analysis.unwrap(&settings, &Progress::new()) {
+            Err(UnwrapError::Setting { name, .. }) => name,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(refused(Settings::default()), "weld");
+        assert_eq!(refused(Settings { weld: true, ..Settings::default() }), "weld_distance");
+        assert_eq!(refused(Settings { weld: true, weld_distance: Some(-1.0), ..Settings::default() }), "weld_distance");
+        let (positions, corner_vertices, face_offsets) = squares();
+        let input = MeshInput {
+            positions: &positions,
+            corner_vertices: &corner_vertices,
+            face_offsets: &face_offsets,
+            ..MeshInput::default()
+        };
+        let negative = ConditionOptions { weld: true, weld_distance: Some(f64::NAN) };
+        let error = Analysis::new(&input, &negative, &Progress::new()).map(|_| ());
+        assert!(matches!(error, Err(UnwrapError::Setting { name: "weld_distance", .. })));
+    }
+
+    #[test]
+    fn nothing_is_done_for_who_has_cancelled() {
+        let progress = Progress::new();
+        progress.cancel();
+        let cancelled = analysed(&ConditionOptions::default()).unwrap(&Settings::default(), &progress);
+        assert!(matches!(cancelled, Err(UnwrapError::Cancelled(_))));
+    }
+}

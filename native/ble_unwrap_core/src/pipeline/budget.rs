@@ -167,3 +167,76 @@ impl<'a> Pool<'a> {
         place
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::charts::Patch;
+    use crate::mesh::{FaceId, test_surfaces};
+    use crate::progress::Progress;
+    use crate::settings::LimitOver;
+    use nalgebra::Point3;
+
+    use super::super::charting;
+
+    /// Quarters of a cap of a ball, each flattened by itself.
+    fn quarters() -> (TriMesh, Vec<u32>, Vec<Chart>) {
+        let ball = test_surfaces::sphere(3);
+        let all: Vec<u32> = (0..ball.face_count() as u32).collect();
+        let above = |f: &FaceId| ball.triangle_positions(*f).iter().all(|p| p.z > 0.4);
+        let cap = Patch::of_surface(&ball, &all, ball.faces().filter(above).collect());
+        let mesh = TriMesh::clone(&cap.mesh);
+        let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
+        let quarter = |f: FaceId| {
+            let p = mesh.triangle_positions(f).iter().fold(Point3::origin(), |sum, p| sum + p.coords);
+            (u32::from(p.x > 0.0), u32::from(p.y > 0.0))
+        };
+        let progress = Progress::new();
+        let flat = |place: (u32, u32)| {
+            let faces = mesh.faces().filter(|&f| quarter(f) == place).collect();
+            let patch = Patch::of_surface(&mesh, &polygon, faces);
+            let run = Run::new(&progress, None);
+            charting::as_one(&patch, &Settings::default(), &mut Rungs::default(), &run).expect("runs").expect("flat")
+        };
+        let charts = [(0, 0), (0, 1), (1, 0), (1, 1)].map(flat).to_vec();
+        (mesh, polygon, charts)
+    }
+
+    fn spent(limit: f64) -> (Vec<Chart>, Vec<Chart>) {
+        let (mesh, polygon, charts) = quarters();
+        let settings = Settings { stretch_limit: limit, limit_over: LimitOver::Atlas, ..Settings::default() };
+        let progress = Progress::new();
+        let run = Run::new(&progress, None);
+        let (joined, rungs) = spend(&mesh, &polygon, charts.clone(), &settings, &run).expect("not cancelled");
+        let merges: usize = rungs.taken().iter().filter(|r| r.0 == "merge").map(|r| r.1).sum();
+        assert_eq!(merges, charts.len() - joined.len());
+        let mut faces: Vec<FaceId> = joined.iter().flat_map(|c| c.patch.faces.iter().copied()).collect();
+        faces.sort_unstable();
+        assert!(faces.into_iter().eq(mesh.faces()), "each face once");
+        (charts, joined)
+    }
+
+    /// L2 stretch of charts taken together.
+    fn l2(charts: &[Chart]) -> f64 {
+        let sum = |f: &dyn Fn(&Chart) -> f64| charts.iter().map(f).sum::<f64>();
+        (sum(&|c| c.patch.area() * c.l2 * c.l2) / sum(&|c| c.patch.area())).sqrt()
+    }
+
+    #[test]
+    fn all_is_joined_where_the_limit_is_far_and_nothing_where_it_is_reached() {
+        let (before, joined) = spent(1.5);
+        assert_eq!((before.len(), joined.len()), (4, 1));
+        assert!(l2(&joined) > l2(&before) && l2(&joined) < 1.5);
+        let (before, joined) = spent(1.0 + 0.5 * (l2(&before) - 1.0));
+        assert_eq!(joined.len(), before.len());
+    }
+
+    #[test]
+    fn what_there_is_is_spent_and_no_more() {
+        let (before, whole) = spent(1.5);
+        let limit = 0.5 * (l2(&before) + l2(&whole));
+        let (_, joined) = spent(limit);
+        assert!((2..4).contains(&joined.len()), "{}", joined.len());
+        assert!(l2(&joined) <= limit);
+    }
+}
