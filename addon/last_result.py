@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
-from .mesh_arrays import crowded_edges, read_array
+from .mesh_arrays import crowded_edges, opposed_edges, read_array
 
 # After undo the UVs are compared. In edit mode that takes a second a million corners: above this many it is not
 # tried, and the certificate is put away.
@@ -28,6 +28,9 @@ class BLEUnwrapCertificate(bpy.types.PropertyGroup):
         name="Maps", description="JSON list of [object, session_uid, map, corners, digest]", options={"SKIP_SAVE"}
     )
     crowded: IntProperty(name="Edges", description="Edges with more than two faces", options={"SKIP_SAVE"})
+    opposed: IntProperty(
+        name="Edges", description="Edges between faces that turn against each other", options={"SKIP_SAVE"}
+    )
     holds: BoolProperty(name="Holds", description="The UVs are those that were measured", options={"SKIP_SAVE"})
 
 
@@ -39,7 +42,9 @@ def show(context, title, lines, maps):
     shown.maps = json.dumps(
         [(obj.name, obj.session_uid, name, _corner_count(obj), _digest(obj, name)) for obj, name in maps]
     )
-    shown.crowded = sum(int(crowded_edges(obj.data).sum()) for obj, _ in maps if obj.type == "MESH")
+    meshes = [obj.data for obj, _ in maps if obj.type == "MESH"]
+    shown.crowded = sum(int(crowded_edges(mesh).sum()) for mesh in meshes)
+    shown.opposed = sum(int(opposed_edges(mesh).sum()) for mesh in meshes)
     shown.holds = True
 
 

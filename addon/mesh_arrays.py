@@ -51,6 +51,16 @@ def crowded_edges(mesh):
     return np.bincount(corner_edges, minlength=len(mesh.edges)) > 2
 
 
+def opposed_edges(mesh):
+    """Edges of two faces that both run along it the same way, so that their normals point to opposite sides, (e,) bool."""
+    corner_edges = read_array(mesh.loops, "edge_index", np.int32)
+    first = read_array(mesh.edges, "vertices", np.int32, 2)[:, 0]
+    forward = read_corner_vertices(mesh) == first[corner_edges]
+    count = np.bincount(corner_edges, minlength=len(mesh.edges))
+    forwards = np.bincount(corner_edges[forward], minlength=len(mesh.edges))
+    return (count == 2) & (forwards != 1)
+
+
 @contextmanager
 def object_mode(meshes):
     """Leaves edit mode for a while if any of the meshes is in it: UV maps are empty arrays there."""

@@ -69,11 +69,13 @@ class _Certificate:
             for line in wrapped(text):
                 column.label(text=line, icon=icon)
                 icon = "BLANK1"
-        if certificate.crowded:
-            number = f"{certificate.crowded:,} Edge{'' if certificate.crowded == 1 else 's'}"
-            self.layout.operator(
-                "mesh.ble_unwrap_select_edges", text=f"Select {number} with More than Two Faces", icon="EDGESEL"
-            )
+        for kind, count, what in (
+            ("CROWDED", certificate.crowded, "with More than Two Faces"),
+            ("OPPOSED", certificate.opposed, "between Opposed Faces"),
+        ):
+            if count:
+                text = f"Select {count:,} Edge{'' if count == 1 else 's'} {what}"
+                self.layout.operator("mesh.ble_unwrap_select_edges", text=text, icon="EDGESEL").kind = kind
 
 
 class _Advanced:

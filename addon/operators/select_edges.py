@@ -3,16 +3,37 @@
 import bmesh
 import bpy
 import numpy as np
+from bpy.props import EnumProperty
 
 from .. import last_result
-from ..mesh_arrays import crowded_edges, read_array
+from ..mesh_arrays import crowded_edges, opposed_edges, read_array
+
+EDGES = {"CROWDED": crowded_edges, "OPPOSED": opposed_edges}
 
 
 class MESH_OT_ble_unwrap_select_edges(bpy.types.Operator):
     bl_idname = "mesh.ble_unwrap_select_edges"
-    bl_label = "Select Edges with More than Two Faces"
-    bl_description = "In Edit Mode, select the edges of the last result's meshes that more than two faces share"
+    bl_label = "Select Irregular Edges"
+    bl_description = "In Edit Mode, select the edges of the last result's meshes at which the surface is irregular"
     bl_options = {"REGISTER", "UNDO"}
+
+    kind: EnumProperty(
+        name="Edges",
+        items=(
+            (
+                "CROWDED",
+                "More than Two Faces",
+                "Edges that more than two faces share; the surface is cut there in part",
+            ),
+            (
+                "OPPOSED",
+                "Opposed Faces",
+                "Edges of two faces whose normals point to opposite sides: faces that are flipped, or a surface with one "
+                "side only, such as a Möbius strip, which is cut there",
+            ),
+        ),
+        default="CROWDED",
+    )
 
     @classmethod
     def poll(cls, context):
@@ -25,9 +46,10 @@ class MESH_OT_ble_unwrap_select_edges(bpy.types.Operator):
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         visible = [obj for obj in last_result.objects(context) if obj.type == "MESH" and obj.visible_get()]
-        found = {obj: shown for obj in visible if (shown := visible_crowded_edges(obj.data)).size}
+        found = {obj: shown for obj in visible if (shown := visible_edges(obj.data, EDGES[self.kind])).size}
         if not found:
-            self.report({"WARNING"}, "No visible edge of these meshes has more than two faces")
+            which = {"CROWDED": "has more than two faces", "OPPOSED": "lies between opposed faces"}[self.kind]
+            self.report({"WARNING"}, f"No visible edge of these meshes {which}")
             return {"CANCELLED"}
         for obj in context.view_layer.objects:
             obj.select_set(obj in found)
@@ -46,9 +68,9 @@ class MESH_OT_ble_unwrap_select_edges(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def visible_crowded_edges(mesh):
-    """Indices of the edges that more than two faces share and that edit mode would show."""
-    return np.flatnonzero(crowded_edges(mesh) & ~read_array(mesh.edges, "hide", bool))
+def visible_edges(mesh, is_meant):
+    """Indices of the edges that are meant and that edit mode would show."""
+    return np.flatnonzero(is_meant(mesh) & ~read_array(mesh.edges, "hide", bool))
 
 
 def register():

@@ -216,9 +216,29 @@ def test_edges_of_a_warning_can_be_selected(addon):
     assert is_true(addon)
 
 
+def test_where_a_one_sided_band_is_cut_can_be_selected():
+    """A Möbius strip: its faces turn against each other across one edge, wherever they begin."""
+    count = 12
+    turn = 2 * np.pi * np.arange(count) / count
+    side = np.stack([np.cos(turn / 2) * np.cos(turn), np.cos(turn / 2) * np.sin(turn), np.sin(turn / 2)], axis=1) / 3
+    middle = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    faces = [(k, k + 1, count + k + 1, count + k) for k in range(count - 1)]
+    faces.append((count - 1, count, 0, 2 * count - 1))
+    obj = add_mesh("Band", np.concatenate([middle + side, middle - side]).tolist(), faces)
+    select(obj)
+    unwrap()
+    certificate = bpy.context.window_manager.ble_unwrap_certificate
+    assert (certificate.crowded, certificate.opposed) == (0, 1)
+    assert any("one side" in text for status, text in shown_lines() if status == "WARN")
+    assert bpy.ops.mesh.ble_unwrap_select_edges(kind="OPPOSED") == {"FINISHED"}
+    picked = [edge for edge in bmesh.from_edit_mesh(obj.data).edges if edge.select]
+    assert [sorted(vertex.index for vertex in edge.verts) for edge in picked] == [[0, 2 * count - 1]]
+
+
 def test_no_edges_to_select_where_there_are_none():
     grid()
     unwrap()
-    assert bpy.context.window_manager.ble_unwrap_certificate.crowded == 0
+    certificate = bpy.context.window_manager.ble_unwrap_certificate
+    assert (certificate.crowded, certificate.opposed) == (0, 0)
     assert uvs(bpy.data.objects["Grid"]).any()
     assert bpy.ops.mesh.ble_unwrap_select_edges() == {"CANCELLED"}

@@ -47,6 +47,7 @@ use nalgebra::Point2;
 use rayon::prelude::*;
 
 use crate::clock::Clock;
+use crate::memory;
 use crate::progress::{Cancelled, Progress, Stage};
 use crate::report::counted;
 use crate::settings::{NEIGHBOURS, Settings};
@@ -64,6 +65,8 @@ use sample::Sample;
 
 /// Indices are 32 bits, one value of which stands for "none".
 const MOST_POINTS: usize = (1 << 31) - 1;
+/// What a point takes at the peak, in bytes: 1,300 were measured with the usual number of neighbours.
+const OF_POINT: u64 = 2048;
 /// Charts under this share of the surface do not count as the worst.
 const NEGLIGIBLE: f64 = 1e-4;
 /// Share of the charting stage that the neighbourhood graph takes.
@@ -107,6 +110,7 @@ pub fn unwrap_points(
     if positions.len() > MOST_POINTS {
         return Err(CloudError::TooLarge { points: positions.len() });
     }
+    memory::require((positions.len() as u64).saturating_mul(OF_POINT)).map_err(Cancelled::OutOfMemory)?;
     let mut clock = Clock::new();
     progress.enter(Stage::Condition);
     let cloud = clean::clean(positions, progress)?;

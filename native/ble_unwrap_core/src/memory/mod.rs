@@ -5,6 +5,7 @@
 //! are asked for fallibly ([`reserve`]). And an allocator that had to fall back on its reserve says so by
 //! [`note_refusal`], upon which every computation under way stops at its next look at [`Progress`](crate::Progress).
 
+mod container;
 mod last_cache;
 
 use std::fs;
@@ -92,8 +93,8 @@ pub fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>, OutOfMemory> {
     Ok(room)
 }
 
-/// Bytes left to this process: the least of what its limits leave and what the machine has to give, swap included. `None`
-/// where the platform does not tell. Read from `/proc` on Linux; elsewhere the system's own refusal has to do.
+/// Bytes left to this process: the least of what its own limits and those of its container leave and what the machine has to
+/// give, swap included. `None` where the platform does not tell. Read from `/proc` and the control groups on Linux; elsewhere the system's own refusal has to do.
 #[must_use]
 pub fn available() -> Option<u64> {
     if !cfg!(target_os = "linux") {
@@ -108,8 +109,12 @@ pub fn available() -> Option<u64> {
     let machine = read("/proc/meminfo").and_then(|text| {
         Some(kibibytes(&text, "MemAvailable:")?.saturating_add(kibibytes(&text, "SwapFree:").unwrap_or(0)))
     });
-    let all =
-        [left(limit("Max address space"), taken("VmSize:")), left(limit("Max data size"), taken("VmData:")), machine];
+    let all = [
+        left(limit("Max address space"), taken("VmSize:")),
+        left(limit("Max data size"), taken("VmData:")),
+        machine,
+        container::left(),
+    ];
     all.into_iter().flatten().min()
 }
 

@@ -6,6 +6,7 @@
 use nalgebra::Point3;
 use rayon::prelude::*;
 
+use crate::memory;
 use crate::progress::{Cancelled, Progress};
 
 use super::gap::{GAP_SEARCH_TEXELS, OwnedSegment, least_gap};
@@ -23,6 +24,8 @@ const OVERLAP_SHARE: f64 = 1e-9;
 const SPECK: f64 = 1e-4;
 /// unless even the largest chart is so small: then those do that have at least this share of its area.
 const SPECK_AMONG_SMALL: f64 = 1e-2;
+/// What a triangle takes at the peak, in bytes: 700 were measured where each is a chart of its own, 340 in one chart.
+const OF_TRIANGLE: u64 = 1024;
 /// How far outside the unit square coordinates may lie before the layout counts as out of range.
 const RANGE_SLACK: f64 = 1e-5;
 
@@ -117,6 +120,7 @@ pub struct Measures {
 /// [`Cancelled`].
 pub fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Cancelled> {
     let m = mesh.triangle_count();
+    memory::require((m as u64).saturating_mul(OF_TRIANGLE)).map_err(Cancelled::OutOfMemory)?;
     let (positions, unit) = unit_positions(mesh);
     progress.check()?;
     let topology = UvTopology::new(mesh, &positions);

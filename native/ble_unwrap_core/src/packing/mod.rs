@@ -59,6 +59,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::choice::choices;
+use crate::memory;
 use crate::progress::{Cancelled, Progress};
 use outline::Outline;
 
@@ -271,6 +272,18 @@ pub enum PackError {
     Cancelled(#[from] Cancelled),
 }
 
+/// What a triangle takes while its outline is found, and what a chart in many poses does, in bytes.
+const OF_TRIANGLE: u64 = 256;
+const OF_ITEM: u64 = 8 << 10;
+
+/// Fails where less memory is left than packing takes, by an estimate on the safe side.
+fn require_memory(items: &[PackItem<'_>]) -> Result<(), Cancelled> {
+    let triangles: usize = items.iter().map(|item| item.triangles.len()).sum();
+    let needed =
+        (triangles as u64).saturating_mul(OF_TRIANGLE).saturating_add((items.len() as u64).saturating_mul(OF_ITEM));
+    memory::require(needed).map_err(Cancelled::OutOfMemory)
+}
+
 /// Poses that place all charts in the texture, at the greatest common density found.
 ///
 /// Guaranteed, also after rounding UVs to f32: two different charts are at least the margin apart,
@@ -290,6 +303,7 @@ pub enum PackError {
 pub fn pack(items: &[PackItem<'_>], settings: &PackSettings, progress: &Progress) -> Result<Packed, PackError> {
     settings.check()?;
     progress.check()?;
+    require_memory(items)?;
     let outline = |(i, item)| {
         progress.check()?;
         Outline::new(item, i)
