@@ -52,7 +52,7 @@ def crowded_edges(mesh):
 
 
 def opposed_edges(mesh):
-    """Edges of two faces that both run along it the same way, so that their normals point to opposite sides, (e,) bool."""
+    """Edges of two faces whose normals point to opposite sides: both run along the edge the same way, (e,) bool."""
     corner_edges = read_array(mesh.loops, "edge_index", np.int32)
     first = read_array(mesh.edges, "vertices", np.int32, 2)[:, 0]
     forward = read_corner_vertices(mesh) == first[corner_edges]

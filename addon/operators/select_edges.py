@@ -28,8 +28,8 @@ class MESH_OT_ble_unwrap_select_edges(bpy.types.Operator):
             (
                 "OPPOSED",
                 "Opposed Faces",
-                "Edges of two faces whose normals point to opposite sides: faces that are flipped, or a surface with one "
-                "side only, such as a Möbius strip, which is cut there",
+                "Edges of two faces whose normals point to opposite sides: faces that are flipped, or a surface with "
+                "one side only, such as a Möbius strip, which is cut there",
             ),
         ),
         default="CROWDED",
