@@ -24,7 +24,7 @@ mod tests {
         let (a, b) = ([12.0, 12.0], [24.0, 24.0]);
         let next = f64::from_bits(0.5f64.to_bits() + 1);
         assert!(orientation([0.5, 0.5], a, b) == 0.0);
-        assert!(orientation([0.5, next], a, b) < 0.0 && orientation([next, 0.5], a, b) > 0.0);
+        assert!(orientation([0.5, next], a, b) > 0.0 && orientation([next, 0.5], a, b) < 0.0);
         assert!(orientation([f64::NAN, 0.0], a, b).is_nan());
     }
 }

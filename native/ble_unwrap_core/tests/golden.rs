@@ -33,23 +33,23 @@ const SEAM_SHARE: f64 = 0.05;
 const EFFICIENCY: f64 = 0.04;
 
 static ROWS: [Row; 17] = [
-    row("flat grid", [1, 1], 1.000_001, 0.0, 0.94),
-    row("bumpy grid", [1, 1], 1.02, 0.0, 0.70),
-    row("disc", [1, 1], 1.000_001, 0.0, 0.73),
-    row("L shape", [1, 1], 1.000_001, 0.0, 0.70),
-    row("annulus", [1, 1], 1.000_001, 0.0, 0.61),
-    row("cap of 40 degrees", [1, 1], 1.02, 0.0, 0.70),
-    row("hemisphere", [1, 1], 1.03, 0.0, 0.73),
+    row("flat grid", [1, 1], 1.0, 0.0, 0.996),
+    row("bumpy grid", [1, 1], 1.0075, 0.0, 0.750),
+    row("disc", [1, 1], 1.0, 0.0, 0.783),
+    row("L shape", [1, 1], 1.0, 0.0, 0.747),
+    row("annulus", [1, 1], 1.0, 0.0, 0.658),
+    row("cap of 40 degrees", [1, 1], 1.0008, 0.0, 0.782),
+    row("hemisphere", [1, 1], 1.0211, 0.0, 0.782),
     row("icosphere", [1, 1], 1.07, 0.93, 0.60),
-    row("open cylinder", [1, 1], 1.000_001, 0.76, 0.43),
-    row("capped cylinder", [1, 1], 1.06, 1.90, 0.49),
-    row("cone", [1, 1], 1.000_001, 0.85, 0.54),
-    row("torus", [1, 1], 1.04, 1.89, 0.39),
+    row("open cylinder", [1, 1], 1.0, 0.691, 0.476),
+    row("capped cylinder", [1, 1], 1.0084, 2.473, 0.486),
+    row("cone", [1, 1], 1.0, 0.85, 0.54),
+    row("torus", [1, 1], 1.0278, 1.721, 0.436),
     row("plate with five holes", [2, 2], 1.06, 4.45, 0.60),
-    row("Moebius strip", [2, 2], 1.001, 0.64, 0.52),
-    row("Klein bottle", [1, 1], 1.04, 1.90, 0.55),
-    row("face", [1, 1], 1.04, 0.0, 0.73),
-    row("small sculpt", [1, 3], 1.1, 4.5, 0.38),
+    row("Moebius strip", [2, 2], 1.0, 0.617, 0.548),
+    row("Klein bottle", [1, 1], 1.0326, 1.729, 0.601),
+    row("face", [1, 1], 1.0304, 0.0, 0.779),
+    row("small sculpt", [2, 2], 1.0254, 4.202, 0.536),
 ];
 
 #[test]
