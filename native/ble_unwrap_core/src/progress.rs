@@ -4,10 +4,12 @@ use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 
 use thiserror::Error;
 
+use crate::error_kind::ErrorKind;
 use crate::memory::{self, OutOfMemory};
 
 /// The computation was broken off; nothing was produced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum Cancelled {
     /// It was asked to stop.
     #[error("cancelled")]
@@ -17,8 +19,20 @@ pub enum Cancelled {
     OutOfMemory(OutOfMemory),
 }
 
+impl Cancelled {
+    /// What kind of error this is.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::OnRequest => ErrorKind::Cancelled,
+            Self::OutOfMemory(_) => ErrorKind::OutOfMemory,
+        }
+    }
+}
+
 /// What the pipeline is doing, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 #[repr(u8)]
 pub enum Stage {
     /// Not started.

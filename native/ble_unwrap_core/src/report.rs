@@ -5,6 +5,7 @@ use crate::metrics::Measures;
 /// Quality and history of an unwrapped mesh. Distortions as in [`Measures`]: NaN where not one triangle could be measured,
 /// of which a warning tells.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Report {
     /// Number of charts.
     pub charts: usize,

@@ -42,18 +42,19 @@ mod square_matrix;
 mod truncated;
 mod unfold;
 
-pub use affinity::{Affinity, Kernel, KernelWidth, kernel_width, model_affinity};
-pub use bernoulli_logistic::{Fit, FitOptions, LogitModel, Update, fit};
-pub use chart::{ChartEmbedding, embed_chart};
+pub use affinity::KernelWidth;
+pub use bernoulli_logistic::Update;
 pub use embed::{EmbedOptions, embed};
 pub use embedded::Embedding;
 pub use error::EmbeddingError;
-pub use gauge::fix_gauge;
 pub use input::{EmbedInput, PointMetric};
-pub use landmark_regression::{Evidence, LandmarkModel};
+pub use landmark_regression::Evidence;
 pub use placement::{FittedLandmarks, place};
 pub use settings::{EmbeddingSettings, Initial, Model};
-pub use unfold::{plane, project, unfold};
+
+pub(crate) use chart::{ChartEmbedding, embed_chart};
+pub(crate) use gauge::fix_gauge;
+pub(crate) use unfold::{plane, project, unfold};
 
 #[cfg(test)]
 mod embed_tests;

@@ -15,6 +15,7 @@ const PRINTED_MEAN_AFFINITY: f64 = 0.57;
 
 /// How distances become positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Model {
     /// Bernoulli logistic embedding with intercepts and the logistic kernel: exact on developable charts.
     Default,
@@ -42,6 +43,7 @@ impl Model {
 
 /// Where the fit starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Initial {
     /// Classical scaling.
     Mds,

@@ -4,6 +4,7 @@ use crate::choice::choices;
 
 /// How distances along a surface are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Metric {
     /// Fast marching across triangles ([`FastMarching`](super::FastMarching)).
     FastMarching,

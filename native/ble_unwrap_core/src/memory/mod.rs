@@ -16,6 +16,7 @@ pub(crate) use last_cache::last_cache;
 
 /// The computation needs more memory than there is; nothing was produced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum OutOfMemory {
     /// Found before the work began.
     #[error(

@@ -28,6 +28,7 @@ const RANGE_SLACK: f64 = 1e-5;
 
 /// The figures of one chart.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ChartMeasures {
     /// Lowest triangle of the chart.
     pub first_triangle: usize,
@@ -45,6 +46,7 @@ pub struct ChartMeasures {
 /// with finite UVs and degenerate neither on the surface nor in UV; NaN if there are none. A flipped
 /// triangle enters them with the absolute value of its area.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Measures {
     /// Charts: sets of triangles connected over UV edges.
     pub charts: usize,
@@ -115,7 +117,7 @@ pub struct Measures {
 ///
 /// # Errors
 /// [`Cancelled`].
-pub fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Cancelled> {
+pub(crate) fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Cancelled> {
     let m = mesh.triangle_count();
     let (positions, unit) = unit_positions(mesh);
     progress.check()?;

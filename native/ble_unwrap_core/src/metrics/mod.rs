@@ -8,14 +8,17 @@
 mod bent_quads;
 mod box_tree;
 mod gap;
+mod layout_arrays;
 mod measure;
 mod overlap;
 mod uv_mesh;
 mod uv_topology;
 
-pub use bent_quads::bent_quads;
-pub use measure::{ChartMeasures, Measures, measure};
-pub use uv_mesh::{Texture, UvMesh, UvMeshError};
+pub(crate) use bent_quads::bent_quads;
+pub(crate) use layout_arrays::LayoutArrays;
+pub(crate) use measure::measure;
+pub use measure::{ChartMeasures, Measures};
+pub(crate) use uv_mesh::{Texture, TooManyTriangles, UvMesh};
 
 pub(crate) use box_tree::{Bounds, BoxTree, Visitor, in_batches};
 pub(crate) use gap::{GAP_SEARCH_TEXELS, OwnedSegment, least_gap};

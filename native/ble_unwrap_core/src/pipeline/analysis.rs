@@ -36,35 +36,38 @@ pub struct Analysis {
 }
 
 impl Analysis {
-    /// Copies the mesh and conditions it; `conditioning` as of the [`Settings`] it will be unwrapped with. O(n log n).
+    /// Copies the mesh and conditions it, as the settings it will be unwrapped with say: of these `weld` and `weld_distance`
+    /// count. O(n log n).
     ///
     /// # Errors
-    /// [`UnwrapError::Mesh`] if the arrays do not make a mesh; [`UnwrapError::Setting`] if the weld distance is negative or not
-    /// finite; cancelled.
-    pub fn new(
-        input: &MeshInput<'_>,
-        conditioning: &ConditionOptions,
-        progress: &Progress,
-    ) -> Result<Self, UnwrapError> {
+    /// [`UnwrapError::Mesh`] if the arrays do not make a mesh; [`UnwrapError::Setting`] if a setting is out of its range;
+    /// cancelled.
+    pub fn new(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -> Result<Self, UnwrapError> {
         progress.check()?;
-        let ConditionOptions { weld, weld_distance } = *conditioning;
-        Settings { weld, weld_distance, ..Settings::default() }.validate()?;
+        settings.validate()?;
         progress.enter(Stage::Condition);
-        let prepared = Prepared::new(input, conditioning, progress)?;
+        let conditioning = settings.conditioning();
+        let prepared = Prepared::new(input, &conditioning, progress)?;
         Ok(Self {
             memo: Memo::new(prepared.surface.mesh.face_count()),
             prepared,
             positions: input.positions.to_vec(),
             corner_vertices: input.corner_vertices.to_vec(),
             face_offsets: input.face_offsets.to_vec(),
-            conditioning: *conditioning,
+            conditioning,
         })
     }
 
-    /// What the mesh was conditioned with.
+    /// Whether vertices at the same position count as one.
     #[must_use]
-    pub fn conditioning(&self) -> &ConditionOptions {
-        &self.conditioning
+    pub fn weld(&self) -> bool {
+        self.conditioning.weld
+    }
+
+    /// How near to each other such vertices are; `None` for what single precision cannot tell apart.
+    #[must_use]
+    pub fn weld_distance(&self) -> Option<f64> {
+        self.conditioning.weld_distance
     }
 
     /// Number of faces of the mesh.

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use thiserror::Error;
 
+use crate::error_kind::ErrorKind;
 use crate::geodesics::{DijkstraScratch, FastMarching, MarchScratch, Metric, WeightedGraph, dijkstra};
 use crate::memory;
 use crate::mesh::{self, ConditionOptions, MeshError, MeshInput, Surface, VertexId};
@@ -10,6 +11,7 @@ use crate::progress::{Cancelled, Progress, Stage};
 
 /// Why there are no distances.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum DistancesError {
     /// The input arrays do not make a mesh.
     #[error(transparent)]
@@ -38,6 +40,18 @@ pub enum DistancesError {
     /// The caller asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl DistancesError {
+    /// What kind of error this is.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Mesh(error) => error.kind(),
+            Self::Source { .. } | Self::TooLarge { .. } => ErrorKind::Argument,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
 }
 
 /// Distances along a surface from each of k `sources` to each of its n vertices, row by row (k×n), in the
