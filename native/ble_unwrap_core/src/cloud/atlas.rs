@@ -16,8 +16,8 @@ pub struct PointAtlas {
     pub report: CloudReport,
 }
 
-/// Quality and history of an atlas of points. Stretch as in [`crate::distortion`], of the least-squares map of each
-/// point's neighbourhood in its tangent plane; points whose neighbours lie on a line have none.
+/// Quality and history of an atlas of points. Stretch is that of the least-squares map of each point's neighbourhood in
+/// its tangent plane to the texture: with σ₁ ≥ σ₂ its singular values, the squared L2 stretch is ½(1/σ₁² + 1/σ₂²); points whose neighbours lie on a line have none.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct CloudReport {

@@ -56,7 +56,7 @@ choices!(Initial {
     Random: "random", "Random", "Normally distributed points, drawn from the seed.";
 });
 
-/// Parameters of [`embed_chart`](super::embed_chart) and [`embed`](super::embed()).
+/// Parameters of the model and of its fit, for [`embed`](super::embed()) and for the embedding of charts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmbeddingSettings {
     /// The model.

@@ -26,13 +26,7 @@ const LEAST_AREA: f64 = 1e-12;
 pub(crate) struct ConditionOptions {
     /// Whether vertices at the same position are one.
     pub weld: bool,
-    /// How near to each other such vertices are, in the unit of the input: 0 for exactly the same coordinates. `None` for
-    /// what single precision cannot tell apart: 2⁻²¹ of the diagonal of the bounding box or, if all coordinates are numbers
-    /// of single precision, of the greatest of them where that is larger; at most a hundredth of the mean side. Nothing
-    /// without `weld`.
-    ///
-    /// A group of vertices lies within the distance around one of them, so chains are broken up. Two vertices of one polygon
-    /// are never welded unless they coincide: no polygon loses a side by it, however long the distance.
+    /// How near to each other such vertices are, as [`Settings::weld_distance`](crate::Settings::weld_distance) says.
     pub weld_distance: Option<f64>,
 }
 

@@ -10,7 +10,7 @@ use crate::progress::Cancelled;
 /// Polygons as flat arrays, as Blender and most exchange formats keep them.
 ///
 /// Face `f` has the corners `face_offsets[f]..face_offsets[f + 1]`, each of which names a vertex.
-/// Anything may be wrong with the arrays: [`condition`](super::condition()) checks all of them.
+/// Anything may be wrong with the arrays: every function that takes them checks all of them.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MeshInput<'a> {
     /// Coordinates of the vertices, in any unit.

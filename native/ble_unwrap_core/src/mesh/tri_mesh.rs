@@ -10,7 +10,7 @@ use super::index::{FaceId, HalfedgeId, VertexId};
 /// The corner *is* the half-edge: half-edge `3·f + k` leaves corner `k` of face `f` towards
 /// corner `k + 1`. `twin` holds the opposite half-edge, or [`HalfedgeId::NONE`] on a boundary.
 ///
-/// Guaranteed (see [`TriMesh::check_invariants`]): twins are mutual and opposed; the corners of a
+/// Guaranteed (`check_invariants` tests it): twins are mutual and opposed; the corners of a
 /// vertex form one fan, so there is no bow-tie; every vertex is used by a face.
 ///
 /// Not guaranteed: being connected, having a boundary, positive areas, distinct positions.

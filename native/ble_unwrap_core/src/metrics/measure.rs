@@ -112,7 +112,7 @@ pub struct Measures {
 /// layout leaves the unit square.
 ///
 /// Guaranteed: no number in `mesh` makes it panic, and the result does not depend on the number of
-/// threads. Not guaranteed: exactness. Overlaps below the threshold go unseen; [`verify`](crate::verify())
+/// threads. Not guaranteed: exactness. Overlaps below the threshold go unseen; [`verify`](crate::verify::verify())
 /// is exact. O(n log n); about two seconds for a million triangles on two cores.
 ///
 /// # Errors

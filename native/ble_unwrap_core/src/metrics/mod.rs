@@ -3,7 +3,7 @@
 //! [`measure()`] follows the project's independent evaluator definition by definition, so that figures of
 //! this library, of other tools and of hand-made UVs compare. It takes any finite or non-finite
 //! numbers; only index arrays are checked, by [`UvMesh::new`]. The exact checks of our own results
-//! are in [`verify`](crate::verify()).
+//! are in [`verify`](mod@crate::verify).
 
 mod bent_quads;
 mod box_tree;

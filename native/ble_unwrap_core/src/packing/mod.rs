@@ -91,7 +91,7 @@ pub enum Quality {
     High,
 }
 
-/// Settings of [`pack`].
+/// How charts are packed, and into which texture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PackSettings {
     /// Least distance of two charts, and twice the least distance from the border, in texels. At

@@ -85,7 +85,7 @@ pub(crate) enum RoundingError {
 /// Guaranteed: every triangle of the result is strictly positive by an exact test; vertices whose
 /// triangles survive plain rounding are rounded plainly; the result depends on the arguments alone.
 /// Not guaranteed: that all of `halves` are positive (no face is given up for one); that moved boundary vertices leave the boundary simple (they move less than a 64th
-/// of a texel; [`verify`](crate::verify()) tells).
+/// of a texel; [`verify`](crate::verify::verify()) tells).
 ///
 /// O(n) and one pass where nothing breaks; a bounded number of moves otherwise.
 ///

@@ -109,8 +109,13 @@ pub struct Settings {
     /// vertices of the input is then a seam only if the result says so. Turn it on for data that
     /// repeats vertices along seams of its own, as many file formats do.
     pub weld: bool,
-    /// How near to each other such vertices are, in the unit of the input; `None` for what single precision cannot tell
-    /// apart. See [`ConditionOptions::weld_distance`].
+    /// How near to each other such vertices are, in the unit of the input: 0 for exactly the same coordinates. `None` for
+    /// what single precision cannot tell apart: 2⁻²¹ of the diagonal of the bounding box or, if all coordinates are numbers
+    /// of single precision, of the greatest of them where that is larger; at most a hundredth of the mean side. Nothing
+    /// without `weld`.
+    ///
+    /// A group of vertices lies within the distance around one of them, so chains are broken up. Two vertices of one polygon
+    /// are never welded unless they coincide: no polygon loses a side by it, however long the distance.
     pub weld_distance: Option<f64>,
     /// Whether large components are cut on a coarse mesh first. Off, as in the paper's presets, patches are embedded by all
     /// landmarks and ribbons stay whole, too.

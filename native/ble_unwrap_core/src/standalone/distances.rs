@@ -59,8 +59,8 @@ impl DistancesError {
 ///
 /// Infinite where the surface does not lead: to other components, to vertices without faces. A source is
 /// at 0 from itself. Vertices at one position count as one. Where the surface touches itself in a single
-/// vertex, paths begin and end on all sides of it, but none passes through. Accuracy: as promised by
-/// [`FastMarching::march`], rounded to single precision. The same for any number of threads.
+/// vertex, paths begin and end on all sides of it, but none passes through. The accuracy is that of the
+/// [`Metric`], rounded to single precision. The same for any number of threads.
 ///
 /// O(n log n) a source: some 0.4 µs a vertex and source by fast marching.
 ///

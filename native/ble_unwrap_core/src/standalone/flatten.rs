@@ -156,7 +156,7 @@ pub struct MapQuality {
     /// Triangles that are turned over or have no area; exact.
     pub flips: usize,
     /// L2 stretch at the map's best scale, each flipped triangle counted as its mirror image; infinite where one has no
-    /// area. See [`stretch::l2_unsigned`].
+    /// area.
     pub l2: f64,
     /// L-infinity stretch, the worst of any triangle in any direction, at the scale of equal area; likewise.
     pub l_infinity: f64,
@@ -191,7 +191,7 @@ pub struct FlattenReport {
     pub before: MapQuality,
     /// The map returned.
     pub after: MapQuality,
-    /// What took the flips away; see [`Rung::name`](crate::Rung::name).
+    /// What took the flips away: `embedding` if there were none, else `foldover_free`, `tutte_shape` or `tutte_circle`.
     pub rung: &'static str,
     /// Iterations of the stretch minimisation; 0 if it was not asked for.
     pub stretch_iterations: usize,
@@ -223,8 +223,8 @@ pub struct Flattening {
 /// is simple, too, if it was minimised: where it ran over itself, minimisation is done again from a circle, as in
 /// [`unwrap`](crate::unwrap()). The same for any number of threads. Not guaranteed: a bound on the stretch.
 ///
-/// As costly as the steps: O(k n log n) for the distances from k landmarks, then as
-/// [`embed_chart`](crate::embedding::embed_chart) and [`stretch::minimise_stretch`].
+/// As costly as the steps: O(k n log n) for the distances from k landmarks, O(k³ + sweeps·k² + kn) for the embedding, and a
+/// few dozen sparse linear systems of 2n unknowns for the stretch.
 ///
 /// # Errors
 /// [`FlattenError`] says what is wrong with the patch and what to do.

@@ -24,7 +24,8 @@ const SOURCES_AT_ONCE: usize = 256;
 pub enum Connect {
     /// An error, which says how to mend it.
     Error,
-    /// The pieces are joined by the shortest edges ([`shortest_bridges`]).
+    /// The pieces are joined by the shortest edges between them. What leads across such a bridge passes through its two
+    /// ends: distances between the pieces are those of a world in which there is no other way.
     Bridge,
     /// Distances between pieces are infinite.
     Separate,

@@ -70,7 +70,8 @@ pub struct LayoutMeasures {
     pub faces: usize,
     /// Faces that have a negative chart, a corner whose UV is not finite, or a vertex that is not.
     pub unmapped_faces: usize,
-    /// Quads that are convex on the surface and not in UV, see [`bent_quads`](metrics::bent_quads()).
+    /// Quads that are convex on the surface and bent in UV: by one of its two diagonals such a quad is drawn with a triangle
+    /// turned over.
     pub bent_quads: usize,
     /// The figures of the triangulated faces, those with a non-finite vertex left out.
     pub measures: Measures,

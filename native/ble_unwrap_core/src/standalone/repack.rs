@@ -80,8 +80,13 @@ pub struct Repacked {
 /// their margin.
 ///
 /// `triangles` name three of the `points` each; those of one number in `chart` make a chart, connected or
-/// not. Triangles of a negative chart are left out, as are points of no triangle. Guarantees and cost
-/// are those of [`packing::pack`]; the places are then rounded to single precision.
+/// not. Triangles of a negative chart are left out, as are points of no triangle.
+///
+/// Guaranteed, also after rounding to single precision: two different charts are at least the margin apart, every chart lies
+/// within the texture at least half a margin from its border, none is mirrored, and each is at least about a texel large in
+/// its larger extent (unless all its points coincide). The same for any number of threads. Not guaranteed: the greatest
+/// possible density. O(t log t) for t triangles and a bounded number of attempts; on two cores 0.05 to 0.1 s for 2 to 40
+/// charts, 0.2 to 0.3 s for 170.
 ///
 /// # Errors
 /// [`RepackError`]: wrong lengths or indices, a point in two charts, charts that do not fit with their

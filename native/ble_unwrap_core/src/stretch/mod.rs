@@ -76,7 +76,7 @@ choices!(Solver {
     LineSearch: "line_search", "Line Search", "One vertex at a time along random directions, as in the paper.";
 });
 
-/// Settings of [`minimise_stretch`].
+/// How stretch is minimised.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StretchSettings {
     /// The method.
