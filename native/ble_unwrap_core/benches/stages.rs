@@ -1,19 +1,12 @@
 //! The stages of an unwrap by themselves, and the whole, on meshes that grow fourfold.
 
-use ble_unwrap_core::charts::{Patch, cut_to_disk};
-use ble_unwrap_core::distortion::RestTriangle;
-use ble_unwrap_core::embedding::{EmbeddingSettings, embed_chart, fix_gauge};
-use ble_unwrap_core::geodesics::{GeodesicSettings, LandmarkDistances, landmark_distances};
-use ble_unwrap_core::mesh::{ConditionOptions, Surface, TriMesh, coarsen, condition};
-use ble_unwrap_core::metrics::{Texture, UvMesh};
-use ble_unwrap_core::packing::{PackItem, PackSettings, pack};
-use ble_unwrap_core::segmentation::{SegmentationSettings, SpectralAnalysis, segment};
-use ble_unwrap_core::stretch::{self, MinimiseOptions, StretchSettings, first_flip, make_injective, minimise_stretch};
-use ble_unwrap_core::{Atlas, MeshInput, Progress, Settings, unwrap, verify};
+use ble_unwrap_core::internals::{Body, Distances, Layout, Sheet};
+use ble_unwrap_core::settings::PackSettings;
+use ble_unwrap_core::standalone::repack;
+use ble_unwrap_core::{Atlas, MeshInput, Progress, Settings, unwrap};
 use ble_unwrap_fixtures::{FlatPolygons, PolyMesh};
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, BenchmarkId, Criterion, SamplingMode, Throughput};
-use nalgebra::{Point2, Point3};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::cell::LazyCell;
 use std::hint::black_box;
@@ -103,15 +96,14 @@ impl Polygons {
         }
     }
 
-    fn surface(&self) -> Surface {
-        condition(&self.input(), &ConditionOptions::default(), &Progress::new()).expect("a valid mesh")
+    fn body(&self) -> Body {
+        Body::condition(&self.input())
     }
+}
 
-    /// The surface as the one piece it is.
-    fn patch(&self) -> Patch {
-        let surface = self.surface();
-        Patch::whole(surface.mesh, surface.polygon)
-    }
+/// A sculpt as the stages see it.
+fn sculpt(cells: usize) -> Body {
+    Polygons::of(surfaces::sculpt(cells)).body()
 }
 
 fn conditioning(criterion: &mut Criterion, one: &ThreadPool) {
@@ -123,8 +115,8 @@ fn conditioning(criterion: &mut Criterion, one: &ThreadPool) {
             BenchmarkId::new("sculpt", 12 * cells * cells),
             12 * cells * cells,
             || Polygons::of(surfaces::sculpt(cells)),
-            Polygons::surface,
-            |given, surface| surface.mesh.face_count() == given.triangles(),
+            Polygons::body,
+            |given, body| body.triangle_count() == given.triangles(),
         );
     }
     group.finish();
@@ -139,16 +131,12 @@ fn coarsening(criterion: &mut Criterion, one: &ThreadPool) {
             one,
             BenchmarkId::new("sculpt", 12 * cells * cells),
             12 * cells * cells,
-            || surfaces::tri_mesh(&surfaces::sculpt(cells)),
-            |mesh| coarsen(mesh, mesh.vertex_count() / COARSE_SHARE, &Progress::new()).expect("not cancelled"),
-            |mesh, coarse| coarse.mesh.vertex_count() <= mesh.vertex_count() / COARSE_SHARE + 1,
+            || sculpt(cells),
+            |body| body.coarsen(body.vertex_count() / COARSE_SHARE),
+            |body, vertices| *vertices <= body.vertex_count() / COARSE_SHARE + 1,
         );
     }
     group.finish();
-}
-
-fn measured(mesh: &TriMesh) -> LandmarkDistances {
-    landmark_distances(mesh, &GeodesicSettings::default(), &Progress::new()).expect("not cancelled")
 }
 
 /// Choice of the landmarks, and a march from each.
@@ -160,9 +148,9 @@ fn distances(criterion: &mut Criterion, one: &ThreadPool) {
             one,
             BenchmarkId::new("sculpt", 12 * cells * cells),
             12 * cells * cells,
-            || surfaces::tri_mesh(&surfaces::sculpt(cells)),
-            measured,
-            |mesh, found| found.vertex_count() == mesh.vertex_count() && found.row(0).iter().all(|d| d.is_finite()),
+            || sculpt(cells),
+            Body::landmark_distances,
+            |body, found| found.reach(body.vertex_count()),
         );
     }
     group.finish();
@@ -173,10 +161,9 @@ fn segmentation(criterion: &mut Criterion, one: &ThreadPool) {
     let mut group = group(criterion, "segmentation");
     for cells in SCULPTS {
         let make = || {
-            let patch = Polygons::of(surfaces::sculpt(cells)).patch();
-            let distances = measured(&patch.mesh);
-            let analysis = SpectralAnalysis::new(&distances).expect("memory");
-            (patch, distances, analysis)
+            let body = sculpt(cells);
+            let distances = body.landmark_distances().analysed();
+            (body, distances)
         };
         case(
             &mut group,
@@ -184,8 +171,8 @@ fn segmentation(criterion: &mut Criterion, one: &ThreadPool) {
             BenchmarkId::new("analysis", 12 * cells * cells),
             12 * cells * cells,
             make,
-            |(_, distances, _)| SpectralAnalysis::new(distances).expect("memory"),
-            |_, analysis| analysis.dimension >= 2 && analysis.planarity < 0.9,
+            |(_, distances)| distances.analyse(),
+            |_, &(dimension, planarity)| dimension >= 2 && planarity < 0.9,
         );
         case(
             &mut group,
@@ -193,13 +180,8 @@ fn segmentation(criterion: &mut Criterion, one: &ThreadPool) {
             BenchmarkId::new("split", 12 * cells * cells),
             12 * cells * cells,
             make,
-            |(patch, distances, analysis)| {
-                let settings = SegmentationSettings::default();
-                let progress = Progress::new();
-                segment(&patch.mesh, &patch.polygon, distances, analysis, true, &settings, &progress)
-                    .expect("not cancelled")
-            },
-            |_, parts| parts.parts >= 2,
+            |(body, distances)| body.segment(distances),
+            |_, &parts| parts >= 2,
         );
     }
     group.finish();
@@ -213,50 +195,30 @@ fn cutting(criterion: &mut Criterion, one: &ThreadPool) {
             one,
             BenchmarkId::new("ring", 4 * across * across),
             4 * across * across,
-            || surfaces::ring(across),
-            |mesh| cut_to_disk(mesh, |h| mesh.edge_length(h), |_| false),
-            |mesh, cuts| {
-                let faces: Vec<_> = mesh.faces().collect();
-                let is_cut = |h| cuts.binary_search(&mesh.twin(h).min(h)).is_ok();
-                mesh.submesh(&faces, is_cut).0.topology().is_disk()
-            },
+            || Polygons::of(surfaces::ring(across)).body(),
+            Body::cut_to_disk,
+            |body, cuts| body.is_disk_without(cuts),
         );
     }
     group.finish();
 }
 
-/// A face-like sheet with a map of it.
-struct Sheet {
-    mesh: TriMesh,
-    rest: Vec<RestTriangle>,
-    uv: Vec<Point2<f64>>,
+/// A face-like sheet with a map of it, as the embedding leaves it.
+fn embedded(side: usize) -> Sheet {
+    Sheet::embedded(Polygons::of(surfaces::face(side)).body())
 }
 
-impl Sheet {
-    /// As the embedding leaves it.
-    fn embedded(side: usize) -> Self {
-        let mesh = surfaces::face(side);
-        let rest = RestTriangle::of_mesh(&mesh);
-        let found = embed_chart(&measured(&mesh), &EmbeddingSettings::default(), 0, &Progress::new());
-        let mut uv = found.expect("a sheet has an extent").uv;
-        fix_gauge(&mesh, &rest, &mut uv);
-        Self { mesh, rest, uv }
-    }
+fn folded(side: usize, share: f64) -> Sheet {
+    let sheet = embedded(side);
+    let fold = surfaces::fold(&sheet.map(), share);
+    let sheet = sheet.moved(fold);
+    assert!(sheet.has_flips(), "a fold turns triangles over");
+    sheet
+}
 
-    fn folded(side: usize, share: f64) -> Self {
-        let sheet = Self::embedded(side);
-        let uv = surfaces::folded(&sheet.uv, share);
-        assert!(first_flip(&sheet.mesh, &uv).is_some(), "a fold turns triangles over");
-        Self { uv, ..sheet }
-    }
-
-    fn without_flips(&self) -> Vec<Point2<f64>> {
-        make_injective(&self.mesh, &self.rest, &self.uv, &Progress::new()).expect("a disk").0
-    }
-
-    fn size(side: usize) -> usize {
-        2 * (side - 1) * (side - 1)
-    }
+/// Triangles of a sheet.
+fn size(side: usize) -> usize {
+    2 * (side - 1) * (side - 1)
 }
 
 /// A chart by the distances of its landmarks, which are known.
@@ -266,14 +228,11 @@ fn embedding(criterion: &mut Criterion, one: &ThreadPool) {
         case(
             &mut group,
             one,
-            BenchmarkId::new("face", Sheet::size(side)),
-            Sheet::size(side),
-            || measured(&surfaces::face(side)),
-            |distances| {
-                embed_chart(distances, &EmbeddingSettings::default(), 0, &Progress::new())
-                    .expect("a sheet has an extent")
-            },
-            |_, found| found.converged && found.uv.len() == side * side,
+            BenchmarkId::new("face", size(side)),
+            size(side),
+            || Polygons::of(surfaces::face(side)).body().landmark_distances(),
+            Distances::embed,
+            |_, found| *found == Some(side * side),
         );
     }
     group.finish();
@@ -287,11 +246,11 @@ fn flips(criterion: &mut Criterion, one: &ThreadPool) {
             case(
                 &mut group,
                 one,
-                BenchmarkId::new(name, Sheet::size(side)),
-                Sheet::size(side),
-                || Sheet::folded(side, share),
-                Sheet::without_flips,
-                |sheet, uv| first_flip(&sheet.mesh, uv).is_none(),
+                BenchmarkId::new(name, size(side)),
+                size(side),
+                || folded(side, share),
+                Sheet::make_injective,
+                |sheet, uv| !sheet.clone().with_map(uv).has_flips(),
             );
         }
     }
@@ -305,25 +264,38 @@ fn minimisation(criterion: &mut Criterion, one: &ThreadPool) {
         case(
             &mut group,
             one,
-            BenchmarkId::new("face", Sheet::size(side)),
-            Sheet::size(side),
+            BenchmarkId::new("face", size(side)),
+            size(side),
             || {
-                let sheet = Sheet::embedded(side);
-                let uv = sheet.without_flips();
-                Sheet { uv, ..sheet }
+                let sheet = embedded(side);
+                let uv = sheet.make_injective();
+                sheet.with_map(&uv)
             },
-            |sheet| {
-                let (settings, options) = (StretchSettings::default(), MinimiseOptions::default());
-                minimise_stretch(&sheet.mesh, &sheet.rest, &sheet.uv, &settings, &options, &Progress::new())
-                    .expect("a start without flips")
-            },
-            |sheet, found| {
-                let start = stretch::l2_stretch(&sheet.mesh, &sheet.rest, &sheet.uv);
-                found.converged && found.iterations > 1 && found.l2 < start
-            },
+            Sheet::minimise_stretch,
+            |sheet, found| found.is_some_and(|(l2, iterations)| iterations > 1 && l2 < sheet.l2_stretch()),
         );
     }
     group.finish();
+}
+
+/// Charts as plain arrays.
+#[derive(Default)]
+struct Blobs {
+    points: Vec<[f64; 2]>,
+    triangles: Vec<[i32; 3]>,
+    chart: Vec<i32>,
+}
+
+fn blobs(count: usize) -> Blobs {
+    let mut out = Blobs::default();
+    for k in 0..count {
+        let (points, triangles) = surfaces::blob(k);
+        let first = out.points.len() as i32;
+        out.points.extend(points);
+        out.chart.extend(vec![k as i32; triangles.len()]);
+        out.triangles.extend(triangles.iter().map(|t| t.map(|v| first + v)));
+    }
+    out
 }
 
 fn packing(criterion: &mut Criterion, one: &ThreadPool) {
@@ -334,23 +306,15 @@ fn packing(criterion: &mut Criterion, one: &ThreadPool) {
             one,
             BenchmarkId::new("blobs", charts),
             charts,
-            || (0..charts).map(surfaces::blob).collect::<Vec<_>>(),
+            || blobs(charts),
             |blobs| {
-                let items: Vec<_> = blobs.iter().map(|(points, triangles)| PackItem { points, triangles }).collect();
-                pack(&items, &PackSettings::default(), &Progress::new()).expect("charts that fit")
+                repack(&blobs.points, &blobs.triangles, &blobs.chart, &PackSettings::default(), &Progress::new())
+                    .expect("charts that fit")
             },
-            |_, packed| packed.poses.len() == charts && packed.specks == 0 && packed.efficiency > 0.25,
+            |_, packed| packed.charts == charts && packed.specks == 0 && packed.efficiency > 0.25,
         );
     }
     group.finish();
-}
-
-/// A mesh of triangles with its atlas, for the proof that nothing overlaps.
-struct Mapped {
-    positions: Vec<Point3<f64>>,
-    triangles: Vec<[u32; 3]>,
-    corners: Vec<[u32; 3]>,
-    atlas: Atlas,
 }
 
 fn verification(criterion: &mut Criterion, one: &ThreadPool) {
@@ -363,22 +327,14 @@ fn verification(criterion: &mut Criterion, one: &ThreadPool) {
             12 * cells * cells,
             || {
                 let mesh = Polygons::of(surfaces::sculpt(cells).triangulated());
+                let atlas = unwrapped(&mesh);
                 let triangles = mesh.mesh.triangles();
-                Mapped {
-                    positions: mesh.mesh.positions.iter().map(|&p| p.into()).collect(),
-                    corners: (0..triangles.len() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect(),
-                    triangles,
-                    atlas: unwrapped(&mesh),
-                }
+                let corners = (0..triangles.len() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+                let layout = Layout::new(&mesh.mesh.positions, triangles, corners, atlas.uv, atlas.chart);
+                (layout, atlas.report.charts)
             },
-            |mapped| {
-                let Mapped { positions, triangles, corners, atlas } = mapped;
-                let texture =
-                    Texture::square(Settings::default().packing.width, Settings::default().packing.margin_texels);
-                let mesh = UvMesh::new(positions, triangles, &atlas.uv, corners, &atlas.chart, texture);
-                verify(&mesh.expect("one UV a corner"), &[], &Progress::new()).expect("not cancelled")
-            },
-            |mapped, certificate| certificate.is_valid() && certificate.charts == mapped.atlas.report.charts,
+            |(layout, _)| layout.verify(),
+            |(_, charts), certificate| certificate.is_valid() && certificate.charts == *charts,
         );
     }
     group.finish();

@@ -1,10 +1,9 @@
 //! Meshes and points that the stages are timed on. Nothing random: the same for every run.
 
-use ble_unwrap_core::Progress;
-use ble_unwrap_core::geodesics::{Metric, geodesic_distances};
-use ble_unwrap_core::mesh::TriMesh;
+use ble_unwrap_core::settings::Metric;
+use ble_unwrap_core::standalone::surface_distances;
+use ble_unwrap_core::{MeshInput, Progress};
 use ble_unwrap_fixtures::{PolyMesh, torus, voxels};
-use nalgebra::Point2;
 use std::f64::consts::{FRAC_PI_4, TAU};
 
 /// Directions of the horns (and, of negative height, the dents) of [`sculpt`], with width and height of each.
@@ -39,35 +38,24 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// A mesh of triangles as the stages see it.
-pub(crate) fn tri_mesh(mesh: &PolyMesh) -> TriMesh {
-    let positions: Vec<_> = mesh.positions.iter().map(|&p| p.into()).collect();
-    TriMesh::from_triangles(&positions, &mesh.triangles()).0
-}
-
 /// A torus of `4·across²` triangles: to lay it out, two loops have to be cut.
-pub(crate) fn ring(across: usize) -> TriMesh {
-    tri_mesh(&torus(0.4, 2 * across, across))
+pub(crate) fn ring(across: usize) -> PolyMesh {
+    torus(0.4, 2 * across, across)
 }
 
-/// A copy of a map in the plane with one smooth fold in its middle, as wide as this share of the map: some triangles are
-/// turned over there, as an embedding leaves them that looks at distances alone.
-pub(crate) fn folded(uv: &[Point2<f64>], share: f64) -> Vec<Point2<f64>> {
+/// Moves the points of a map in the plane so that there is one smooth fold in its middle, as wide as this share of the map:
+/// some triangles are turned over there, as an embedding leaves them that looks at distances alone.
+pub(crate) fn fold(uv: &[[f64; 2]], share: f64) -> impl Fn([f64; 2]) -> [f64; 2] + use<> {
     let mean = |k: usize| uv.iter().map(|p| p[k]).sum::<f64>() / uv.len() as f64;
-    let centre = Point2::new(mean(0), mean(1));
-    let extent = uv.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
-    let width = share * extent;
-    uv.iter()
-        .map(|p| {
-            let r = (p - centre) / width;
-            Point2::new(p.x + 1.6 * width * (-r.norm_squared()).exp(), p.y)
-        })
-        .collect()
+    let centre = [mean(0), mean(1)];
+    let square = move |p: &[f64; 2]| (p[0] - centre[0]).powi(2) + (p[1] - centre[1]).powi(2);
+    let width = share * uv.iter().map(square).fold(0.0, f64::max).sqrt();
+    move |p| [p[0] + 1.6 * width * (-square(&p) / (width * width)).exp(), p[1]]
 }
 
 /// Chart number `k` of many: a wavy star-shaped outline, filled by rings of triangles. Sizes differ as those of real
 /// charts do, a few large ones and many small.
-pub(crate) fn blob(k: usize) -> (Vec<Point2<f64>>, Vec<[u32; 3]>) {
+pub(crate) fn blob(k: usize) -> (Vec<[f64; 2]>, Vec<[i32; 3]>) {
     const AROUND: usize = 96;
     const RINGS: usize = 6;
     let fraction = |step: f64| (k as f64 * step).fract();
@@ -75,17 +63,17 @@ pub(crate) fn blob(k: usize) -> (Vec<Point2<f64>>, Vec<[u32; 3]>) {
         (2 + k % 5, 0.15 + 0.3 * fraction(0.618_033_988_749_894_9), TAU * fraction(0.754_877_666));
     let size = 0.2 + fraction(0.569_840_290_998).powi(3);
     let aspect = 1.0 + 1.5 * fraction(0.324_717_957_244);
-    let mut points = vec![Point2::origin()];
+    let mut points = vec![[0.0; 2]];
     for ring in 1..=RINGS {
         for step in 0..AROUND {
             let angle = TAU * step as f64 / AROUND as f64;
             let edge = size * (1.0 + depth * (waves as f64 * angle + turn).sin());
             let r = edge * ring as f64 / RINGS as f64;
-            points.push(Point2::new(aspect * r * angle.cos(), r * angle.sin()));
+            points.push([aspect * r * angle.cos(), r * angle.sin()]);
         }
     }
-    let at = |ring: usize, step: usize| (1 + (ring - 1) * AROUND + step % AROUND) as u32;
-    let mut triangles: Vec<[u32; 3]> = (0..AROUND).map(|step| [0, at(1, step), at(1, step + 1)]).collect();
+    let at = |ring: usize, step: usize| (1 + (ring - 1) * AROUND + step % AROUND) as i32;
+    let mut triangles: Vec<[i32; 3]> = (0..AROUND).map(|step| [0, at(1, step), at(1, step + 1)]).collect();
     for ring in 1..RINGS {
         for step in 0..AROUND {
             let (a, b) = (at(ring, step), at(ring, step + 1));
@@ -98,7 +86,7 @@ pub(crate) fn blob(k: usize) -> (Vec<Point2<f64>>, Vec<[u32; 3]>) {
 
 /// A face-like surface of `side`² vertices: an oval bulge with nose, brows and eye sockets. About the relief of a
 /// scanned face, over one unit of width.
-pub(crate) fn face(side: usize) -> TriMesh {
+pub(crate) fn face(side: usize) -> PolyMesh {
     let bump = |x: f64, y: f64, at: [f64; 2], size: [f64; 2], height: f64| {
         height * (-((x - at[0]) / size[0]).powi(2) - ((y - at[1]) / size[1]).powi(2)).exp()
     };
@@ -114,25 +102,36 @@ pub(crate) fn face(side: usize) -> TriMesh {
     let positions: Vec<_> = (0..side * side)
         .map(|v| {
             let (x, y) = (at(v % side), 1.3 * at(v / side));
-            [x, y, relief(x, y)].into()
+            [x, y, relief(x, y)]
         })
         .collect();
-    let mut triangles = Vec::new();
+    let mut faces = Vec::new();
     for j in 0..side - 1 {
         for i in 0..side - 1 {
             let a = (j * side + i) as u32;
             let (b, c, d) = (a + 1, a + side as u32 + 1, a + side as u32);
-            triangles.extend(if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] });
+            faces.extend(if (i + j) % 2 == 0 {
+                [vec![a, b, c], vec![a, c, d]]
+            } else {
+                [vec![a, b, d], vec![b, c, d]]
+            });
         }
     }
-    TriMesh::from_triangles(&positions, &triangles).0
+    PolyMesh { positions, faces }
 }
 
 /// Geodesic distances of all pairs of vertices, row by row.
-pub(crate) fn distances(mesh: &TriMesh) -> Vec<f64> {
-    let all: Vec<_> = mesh.vertices().collect();
-    let rows = geodesic_distances(mesh, &all, Metric::FastMarching, &Progress::new()).expect("not cancelled");
-    rows.into_rows().into_iter().map(f64::from).collect()
+pub(crate) fn distances(mesh: &PolyMesh) -> Vec<f64> {
+    let flat = mesh.flat();
+    let input = MeshInput {
+        positions: &mesh.positions,
+        corner_vertices: &flat.corner_vertices,
+        face_offsets: &flat.face_offsets,
+        ..MeshInput::default()
+    };
+    let all: Vec<i32> = (0..mesh.positions.len() as i32).collect();
+    let rows = surface_distances(&input, &all, Metric::FastMarching, &Progress::new()).expect("a valid mesh");
+    rows.into_iter().map(f64::from).collect()
 }
 
 /// A sheet rolled up in space, n×3, evenly strewn.

@@ -7,9 +7,9 @@
 use std::fmt::Write;
 
 use ble_unwrap_core::settings::{
-    Argument, Function, Group, Interval, Kind, NEIGHBOURS, Preset, Setting, TABLE, THREADS, Value,
+    Argument, Choice, Function, Group, Interval, Kind, NEIGHBOURS, Named, Preset, Setting, Settings, TABLE, THREADS,
+    Value,
 };
-use ble_unwrap_core::{Choice, Named, Settings};
 
 fn main() {
     print!("{}", table());

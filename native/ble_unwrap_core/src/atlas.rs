@@ -63,7 +63,7 @@ mod tests {
         let triangles = [[0, 1, 2], if turned { [3, 5, 4] } else { [3, 4, 5] }];
         let texture = Texture::square(64, 2.0);
         let mesh = UvMesh::new(&positions, &triangles, &uv, &triangles, &[0, 1], texture).expect("valid arrays");
-        verify(&mesh, &[], &Progress::new()).expect("not cancelled")
+        verify(&mesh, &Progress::new()).expect("not cancelled")
     }
 
     fn proven(certificate: Certificate) -> Result<Atlas, UnwrapError> {

@@ -13,7 +13,7 @@ use crate::mesh::TriMesh;
 /// Triangles flatter than [`RestTriangle::MIN_HEIGHT`] are given that height, so that every rest
 /// triangle has an area and a map to the UV plane has a finite Jacobian.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RestTriangle {
+pub(crate) struct RestTriangle {
     /// Length of the first edge.
     pub x1: f64,
     /// Abscissa of the third corner.
@@ -26,14 +26,14 @@ impl RestTriangle {
     /// Least height over the longest edge, relative to it. Flatter triangles carry no texture worth
     /// protecting (a thousandth of a texel row a texel), and at this height Newton's Hessian still
     /// has a condition number near 1e6.
-    pub const MIN_HEIGHT: f64 = 1e-3;
+    pub(crate) const MIN_HEIGHT: f64 = 1e-3;
     /// What the height of a needle is told by in double precision, with eight digits left.
     const NEEDLE_HEIGHT: f64 = 1e-8;
 
     /// Lays a triangle in the plane. `unit` is a length typical of the mesh: a triangle whose longest
     /// edge is below `unit`·1e-6 becomes an equilateral one of that size.
     #[must_use]
-    pub fn new(p: [Point3<f64>; 3], unit: f64) -> Self {
+    pub(crate) fn new(p: [Point3<f64>; 3], unit: f64) -> Self {
         Self::at_least_as_high(p, unit, Self::MIN_HEIGHT)
     }
 
@@ -61,13 +61,13 @@ impl RestTriangle {
 
     /// Rest triangles of all faces of a mesh; the unit is its mean edge length. O(n).
     #[must_use]
-    pub fn of_mesh(mesh: &TriMesh) -> Vec<Self> {
+    pub(crate) fn of_mesh(mesh: &TriMesh) -> Vec<Self> {
         Self::all(mesh, Self::MIN_HEIGHT)
     }
 
     /// Rest triangles of all faces of a mesh that may be as thin as a needle is: for a map that needs no derivative. O(n).
     #[must_use]
-    pub fn needles_of_mesh(mesh: &TriMesh) -> Vec<Self> {
+    pub(crate) fn needles_of_mesh(mesh: &TriMesh) -> Vec<Self> {
         Self::all(mesh, Self::NEEDLE_HEIGHT)
     }
 
@@ -80,20 +80,20 @@ impl RestTriangle {
     /// Area.
     #[inline]
     #[must_use]
-    pub fn area(&self) -> f64 {
+    pub(crate) fn area(&self) -> f64 {
         0.5 * self.x1 * self.y2
     }
 
     /// The corners in the plane.
     #[inline]
     #[must_use]
-    pub fn corners(&self) -> [Point2<f64>; 3] {
+    pub(crate) fn corners(&self) -> [Point2<f64>; 3] {
         [Point2::new(0.0, 0.0), Point2::new(self.x1, 0.0), Point2::new(self.x2, self.y2)]
     }
 
     /// Cotangents of the angles opposite the three sides, in the order of the half-edges.
     #[must_use]
-    pub fn cotangents(&self) -> [f64; 3] {
+    pub(crate) fn cotangents(&self) -> [f64; 3] {
         let c = self.corners();
         [0, 1, 2].map(|k| {
             let apex = c[(k + 2) % 3];
@@ -105,7 +105,7 @@ impl RestTriangle {
     /// Jacobian of the affine map that takes this triangle to `uv`.
     #[inline]
     #[must_use]
-    pub fn jacobian(&self, uv: [Point2<f64>; 3]) -> Matrix2<f64> {
+    pub(crate) fn jacobian(&self, uv: [Point2<f64>; 3]) -> Matrix2<f64> {
         let (d1, d2) = (uv[1] - uv[0], uv[2] - uv[0]);
         let jx = d1 / self.x1;
         let jy = (d2 - jx * self.x2) / self.y2;
@@ -117,7 +117,7 @@ impl RestTriangle {
 /// nearly conformal maps.
 #[inline]
 #[must_use]
-pub fn singular_values(j: &Matrix2<f64>) -> [f64; 2] {
+pub(crate) fn singular_values(j: &Matrix2<f64>) -> [f64; 2] {
     let (e, f) = (0.5 * (j.m11 + j.m22), 0.5 * (j.m11 - j.m22));
     let (g, h) = (0.5 * (j.m21 + j.m12), 0.5 * (j.m21 - j.m12));
     let (q, r) = (e.hypot(h), f.hypot(g));
@@ -128,21 +128,21 @@ pub fn singular_values(j: &Matrix2<f64>) -> [f64; 2] {
 /// Infinite where the map has no area; the sign of the determinant is not looked at.
 #[inline]
 #[must_use]
-pub fn squared_stretch(j: &Matrix2<f64>) -> f64 {
+pub(crate) fn squared_stretch(j: &Matrix2<f64>) -> f64 {
     squared_stretch_of(j.norm_squared(), j.determinant())
 }
 
 /// The same of |J|² and det J.
 #[inline]
 #[must_use]
-pub fn squared_stretch_of(norm_squared: f64, determinant: f64) -> f64 {
+pub(crate) fn squared_stretch_of(norm_squared: f64, determinant: f64) -> f64 {
     0.5 * norm_squared / (determinant * determinant)
 }
 
 /// Twice the signed area of a triangle in the plane.
 #[inline]
 #[must_use]
-pub fn signed_double_area(uv: [Point2<f64>; 3]) -> f64 {
+pub(crate) fn signed_double_area(uv: [Point2<f64>; 3]) -> f64 {
     (uv[1] - uv[0]).perp(&(uv[2] - uv[0]))
 }
 

@@ -2,15 +2,17 @@
 
 use thiserror::Error;
 
+use crate::error_kind::ErrorKind;
 use crate::memory::OutOfMemory;
 use crate::mesh::MeshError;
-use crate::metrics::UvMeshError;
+use crate::metrics::TooManyTriangles;
 use crate::packing::PackError;
 use crate::progress::Cancelled;
 use crate::verify::Certificate;
 
 /// Why [`unwrap`](crate::unwrap()) gave no atlas. The text names the offending element and the remedy.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum UnwrapError {
     /// The input arrays do not make a mesh.
     #[error(transparent)]
@@ -28,9 +30,12 @@ pub enum UnwrapError {
     /// The charts cannot be packed as asked.
     #[error(transparent)]
     Pack(PackError),
-    /// The result does not fit the checks, which take 2³⁰ triangles.
-    #[error(transparent)]
-    Check(#[from] UvMeshError),
+    /// The result does not fit the checks.
+    #[error("{triangles} triangles are more than the 2^30 that can be checked; give the mesh in parts")]
+    TooManyTriangles {
+        /// Number of triangles.
+        triangles: usize,
+    },
     /// There is not enough memory: seen beforehand, or a piece of it was refused.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemory),
@@ -43,6 +48,22 @@ pub enum UnwrapError {
     /// The caller asked to stop.
     #[error(transparent)]
     Cancelled(Cancelled),
+}
+
+impl UnwrapError {
+    /// What kind of error this is.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Mesh(error) => error.kind(),
+            Self::Setting { .. } => ErrorKind::Argument,
+            Self::Pack(error) => error.kind(),
+            Self::TooManyTriangles { .. } => ErrorKind::Mesh,
+            Self::Unproven(_) => ErrorKind::Unproven,
+            Self::OutOfMemory(_) => ErrorKind::OutOfMemory,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
 }
 
 impl From<Cancelled> for UnwrapError {
@@ -61,6 +82,12 @@ impl From<MeshError> for UnwrapError {
             MeshError::Cancelled(cancelled) => cancelled.into(),
             other => Self::Mesh(other),
         }
+    }
+}
+
+impl From<TooManyTriangles> for UnwrapError {
+    fn from(TooManyTriangles { triangles }: TooManyTriangles) -> Self {
+        Self::TooManyTriangles { triangles }
     }
 }
 

@@ -1,60 +1,167 @@
 //! BLE Unwrap: automatic UV unwrapping by Bernoulli logistic embedding.
 //!
 //! [`unwrap()`] takes a polygon mesh ([`MeshInput`]) to an [`Atlas`]: a UV for every polygon corner, in few
-//! charts, each with bounded stretch, without flips and overlap. The stages are public, too: they are
-//! listed here in the order in which data passes through them.
+//! charts, each with bounded stretch, without flips and overlap. [`unwrap_points()`] does the same for point clouds.
 //!
-//! | stage | module |
+//! | module | for |
 //! |---|---|
-//! | any polygons to an oriented manifold | [`mesh`] |
-//! | distances on the surface | [`geodesics`] |
-//! | where to cut | [`segmentation`], [`charts`] |
-//! | Bernoulli logistic embedding, the paper's method | [`embedding`] |
-//! | no flips, least stretch | [`stretch`] |
-//! | charts into the unit square | [`packing`] |
-//! | single precision, proof, figures | [`rounding`], [`verify()`], [`metrics`] |
+//! | this one | meshes and point clouds to atlases, watched and cancelled by a [`Progress`] |
+//! | [`settings`] | every parameter, its range, and how a host may show it |
+//! | [`standalone`] | single steps: distances, one patch flattened, a layout measured and certified, charts packed |
+//! | [`embedding`] | the paper's method for points of any kind |
+//! | [`memory`] | hosts with an allocator of their own |
 //!
-//! [`unwrap_points()`] does the same for point clouds ([`cloud`]).
+//! All functions take and give plain arrays and check what they are given. Vertices, corners and faces are numbered from 0, as
+//! in the input. The work is done on the `rayon` thread pool of the caller, and the result is the same, bit for bit, for any
+//! number of threads.
+//!
+//! # Unwrapping a mesh
+//!
+//! ```
+//! use ble_unwrap_core::{MeshInput, Progress, Settings, unwrap};
+//!
+//! // A cube: eight vertices, and six quads by their corners.
+//! let positions = [
+//!     [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0],
+//!     [0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0],
+//! ];
+//! let corner_vertices = [0, 3, 2, 1, 4, 5, 6, 7, 0, 1, 5, 4, 1, 2, 6, 5, 2, 3, 7, 6, 3, 0, 4, 7];
+//! let mesh = MeshInput {
+//!     positions: &positions,
+//!     corner_vertices: &corner_vertices,
+//!     face_offsets: &[0, 4, 8, 12, 16, 20, 24],
+//!     ..MeshInput::default()
+//! };
+//! let settings = Settings { stretch_limit: 1.05, ..Settings::default() };
+//! let atlas = unwrap(&mesh, &settings, &Progress::new())?;
+//! assert_eq!((atlas.uv.len(), atlas.chart.len()), (24, 6)); // a UV a corner, a chart a face
+//! assert!(atlas.report.l2_worst_chart < 1.05);
+//! assert!(atlas.certificate.is_valid()); // as that of every atlas
+//! # Ok::<(), ble_unwrap_core::UnwrapError>(())
+//! ```
+//!
+//! # What an error looks like
+//!
+//! Every error is an enumeration whose text names the offending element and the remedy; its `kind` says whose fault it is, by
+//! which a host chooses its own exception.
+//!
+//! ```
+//! use ble_unwrap_core::{ErrorKind, MeshInput, Progress, Settings, unwrap};
+//!
+//! let mesh = MeshInput {
+//!     positions: &[[0.0; 3]; 3],
+//!     corner_vertices: &[0, 1, 7],
+//!     face_offsets: &[0, 3],
+//!     ..MeshInput::default()
+//! };
+//! let error = unwrap(&mesh, &Settings::default(), &Progress::new()).expect_err("there is no vertex 7");
+//! assert_eq!(error.kind(), ErrorKind::Mesh);
+//! assert_eq!(
+//!     error.to_string(),
+//!     "corner 2, of face 0, names vertex 7, but the vertices are numbered 0 to 3 (exclusive); correct or remove the face"
+//! );
+//! ```
+//!
+//! # Judging any layout
+//!
+//! [`measure_layout`](standalone::measure_layout) says how good a layout is, whoever made it,
+//! [`certify`](standalone::certify) proves that it holds what an atlas promises, or names what it breaks.
+//!
+//! ```
+//! use ble_unwrap_core::standalone::{certify, measure_layout};
+//! use ble_unwrap_core::{MeshInput, Progress, Settings};
+//!
+//! // Two squares side by side, and a layout that puts both upon each other.
+//! let mesh = MeshInput {
+//!     positions: &[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [2.0, 1.0, 0.0]],
+//!     corner_vertices: &[0, 1, 4, 3, 1, 2, 5, 4],
+//!     face_offsets: &[0, 4, 8],
+//!     ..MeshInput::default()
+//! };
+//! let square = [[0.2, 0.2], [0.6, 0.2], [0.6, 0.6], [0.2, 0.6]];
+//! let uv = [square, square].concat();
+//! let settings = Settings::default();
+//! let layout = measure_layout(&mesh, &uv, None, &settings, &Progress::new())?;
+//! assert!((layout.measures.l2 - 1.0).abs() < 1e-6 && layout.measures.overlaps > 0);
+//! let certificate = certify(&mesh, &uv, &[0, 1], &settings, &Progress::new())?;
+//! assert!(!certificate.is_valid() && certificate.crossings_between.first.is_some());
+//! # Ok::<(), ble_unwrap_core::standalone::LayoutError>(())
+//! ```
+//!
+//! # Embedding as in the paper
+//!
+//! ```
+//! use ble_unwrap_core::Progress;
+//! use ble_unwrap_core::embedding::{EmbedInput, EmbedOptions, EmbeddingSettings, embed};
+//!
+//! // Distances of the 25 points of a square grid.
+//! let place = |i: usize| [(i % 5) as f64, (i / 5) as f64];
+//! let distance = |i: usize, j: usize| f64::hypot(place(i)[0] - place(j)[0], place(i)[1] - place(j)[1]);
+//! let data: Vec<f64> = (0..25 * 25).map(|k| distance(k / 25, k % 25)).collect();
+//! let input = EmbedInput::Distances { n: 25, data: &data };
+//!
+//! // The model as printed, from a random start. Each sweep of its serial updates raises the likelihood.
+//! let printed = embed(input, &EmbedOptions::default(), &EmbeddingSettings::paper(), &Progress::new())?;
+//! assert_eq!(printed.coordinates.len(), 2 * 25);
+//! assert!(printed.trace.windows(2).all(|pair| pair[1] >= pair[0]));
+//!
+//! // The default model, which has intercepts, gives the distances of flat figures back, in units of the root of sigma.
+//! let found = embed(input, &EmbedOptions::default(), &EmbeddingSettings::default(), &Progress::new())?;
+//! let x = |i: usize| &found.coordinates[2 * i..2 * i + 2];
+//! let between = f64::hypot(x(0)[0] - x(24)[0], x(0)[1] - x(24)[1]) * found.sigma.sqrt();
+//! assert!((between - distance(0, 24)).abs() < 1e-3);
+//! # Ok::<(), ble_unwrap_core::embedding::EmbeddingError>(())
+//! ```
+//!
+//! # What may change
+//!
+//! Errors, results, reports and enumerations may grow in any release and are `non_exhaustive`, but for [`ErrorKind`] and the rows
+//! and kinds of the table of [`settings`], where a host has to know all there are. Structures of parameters may grow, too: where
+//! they have a default, build them by `..Default::default()`, as above, rather than from all their fields.
 //!
 //! The paper: *Bernoulli Embedding Model and Its Application in Texture Mapping*, revised 2006. Where a
-//! stage follows it, its documentation names section and equation.
+//! function follows it, its documentation names section and equation.
 #![forbid(unsafe_code)]
+#![warn(unnameable_types)]
 
 mod atlas;
-pub mod charts;
+mod charts;
 mod choice;
 mod clock;
-pub mod cloud;
-pub mod distortion;
+mod cloud;
+mod distortion;
 pub mod embedding;
 mod error;
-pub mod flattening;
-pub mod geodesics;
-pub mod linalg;
+mod error_kind;
+mod flattening;
+mod geodesics;
+#[doc(hidden)]
+pub mod internals;
+mod linalg;
 pub mod memory;
-pub mod mesh;
-pub mod metrics;
-pub mod packing;
+mod mesh;
+mod metrics;
+mod packing;
 mod pipeline;
 mod predicates;
 mod progress;
 mod report;
-pub mod rounding;
+mod rounding;
 mod rounds;
-pub mod segmentation;
+mod segmentation;
 pub mod settings;
 pub mod standalone;
-pub mod stretch;
+mod stretch;
 mod verify;
 
 pub use atlas::Atlas;
-pub use choice::{Choice, Named};
-pub use cloud::{CloudError, CloudReport, PointAtlas, unwrap_points};
+pub use cloud::{CloudError, CloudReport, PointAtlas, PointDefect, unwrap_points};
 pub use error::UnwrapError;
-pub use flattening::{Rung, Rungs};
+pub use error_kind::ErrorKind;
 pub use mesh::{MeshError, MeshInput};
+pub use packing::PackError;
 pub use pipeline::{Analysis, unwrap};
 pub use progress::{Cancelled, Progress, Stage};
 pub use report::Report;
-pub use settings::{ChartScale, Holes, LimitOver, NEVER_SEWN, Settings};
-pub use verify::{Certificate, Defect, verify};
+pub use settings::Settings;
+pub use verify::{Certificate, Defect};

@@ -4,10 +4,12 @@ use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 
 use thiserror::Error;
 
+use crate::error_kind::ErrorKind;
 use crate::memory::{self, OutOfMemory};
 
 /// The computation was broken off; nothing was produced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum Cancelled {
     /// It was asked to stop.
     #[error("cancelled")]
@@ -17,8 +19,20 @@ pub enum Cancelled {
     OutOfMemory(OutOfMemory),
 }
 
+impl Cancelled {
+    /// What kind of error this is.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::OnRequest => ErrorKind::Cancelled,
+            Self::OutOfMemory(_) => ErrorKind::OutOfMemory,
+        }
+    }
+}
+
 /// What the pipeline is doing, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 #[repr(u8)]
 pub enum Stage {
     /// Not started.
@@ -154,7 +168,7 @@ impl Progress {
     }
 
     /// Reports that `share` (0 to 1) of `stage` is done. For the pipeline.
-    pub fn advance(&self, stage: Stage, share: f64) {
+    pub(crate) fn advance(&self, stage: Stage, share: f64) {
         let end = Stage::ALL[(stage as usize + 1).min(Stage::ALL.len() - 1)].begin();
         self.raise(stage.begin() + (end - stage.begin()) * share.clamp(0.0, 1.0));
     }

@@ -5,6 +5,7 @@ use crate::metrics::Measures;
 /// Quality and history of an unwrapped mesh. Distortions as in [`Measures`]: NaN where not one triangle could be measured,
 /// of which a warning tells.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Report {
     /// Number of charts.
     pub charts: usize,
@@ -28,7 +29,8 @@ pub struct Report {
     pub area_distortion: f64,
     /// Triangles turned over.
     pub flips: usize,
-    /// Quads that are convex on the surface and not in UV, see [`bent_quads`](crate::metrics::bent_quads()).
+    /// Quads that are convex on the surface and bent in UV: by one of its two diagonals such a quad is drawn with a triangle
+    /// turned over.
     pub bent_quads: usize,
     /// Pairs of triangles that share area.
     pub overlaps: u64,
@@ -58,7 +60,7 @@ impl Report {
     /// A report with the figures of a layout and nothing of its history yet. `limit` is the bound on
     /// the L2 stretch of a chart; charts of any size are held to it.
     #[must_use]
-    pub fn new(measures: &Measures, limit: f64) -> Self {
+    pub(crate) fn new(measures: &Measures, limit: f64) -> Self {
         // Labels are chart numbers here; several measured pieces of one chart count once, as the worst.
         let mut over: Vec<(usize, f64)> = measures
             .per_chart

@@ -2,9 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use ble_unwrap_core::cloud::unwrap_points;
 use ble_unwrap_core::settings::NEIGHBOURS;
-use ble_unwrap_core::{CloudError, PointAtlas, Progress, Settings};
+use ble_unwrap_core::{CloudError, PointAtlas, Progress, Settings, unwrap_points};
 use ble_unwrap_fixtures::random;
 
 fn settings() -> Settings {

@@ -1,7 +1,7 @@
 //! What the settings and marks of the user do to whole atlases.
 
-use ble_unwrap_core::mesh::ConditionOptions;
-use ble_unwrap_core::{Analysis, Atlas, Holes, LimitOver, MeshInput, Progress, Settings, UnwrapError, unwrap};
+use ble_unwrap_core::settings::{Holes, LimitOver};
+use ble_unwrap_core::{Analysis, Atlas, MeshInput, Progress, Settings, UnwrapError, unwrap};
 use ble_unwrap_fixtures::{FlatPolygons, PolyMesh, many_components, uv_sphere};
 use rayon::ThreadPoolBuilder;
 
@@ -106,8 +106,7 @@ fn a_limit_over_the_atlas_is_spent_on_fewer_charts_and_kept() {
 fn an_analysis_gives_what_unwrap_gives_whatever_came_before() {
     for mesh in [blob(), uv_sphere(80, 40)] {
         let flat = mesh.flat();
-        let analysis =
-            Analysis::new(&input(&mesh, &flat), &Settings::default().conditioning(), &Progress::new()).expect("a mesh");
+        let analysis = Analysis::new(&input(&mesh, &flat), &Settings::default(), &Progress::new()).expect("a mesh");
         assert_eq!(analysis.face_count(), mesh.faces.len());
         let limit = |stretch_limit| Settings { stretch_limit, ..Settings::default() };
         let calls = [
@@ -128,8 +127,7 @@ fn an_analysis_gives_what_unwrap_gives_whatever_came_before() {
         // From several threads at once, and after one that was cancelled.
         let fresh: Vec<_> =
             calls[..4].iter().map(|s| bytes(&analysis.unwrap(s, &Progress::new()).expect("unwraps"))).collect();
-        let other =
-            Analysis::new(&input(&mesh, &flat), &Settings::default().conditioning(), &Progress::new()).expect("a mesh");
+        let other = Analysis::new(&input(&mesh, &flat), &Settings::default(), &Progress::new()).expect("a mesh");
         let stopped = Progress::new();
         stopped.cancel();
         assert!(matches!(other.unwrap(&calls[0], &stopped), Err(UnwrapError::Cancelled(_))));
@@ -150,11 +148,10 @@ fn an_analysis_refuses_what_it_was_not_made_for() {
     let flat = mesh.flat();
     let mut wrong = input(&mesh, &flat);
     wrong.guides = &[[0, 1], [2, 10_000]];
-    let error =
-        Analysis::new(&wrong, &Settings::default().conditioning(), &Progress::new()).expect_err("no such vertex");
+    let error = Analysis::new(&wrong, &Settings::default(), &Progress::new()).expect_err("no such vertex");
     assert!(error.to_string().contains("guide 1 names vertex 10000"), "{error}");
     let welded = Settings { weld: true, weld_distance: Some(1e-3), ..Settings::default() };
-    let analysis = Analysis::new(&input(&mesh, &flat), &welded.conditioning(), &Progress::new()).expect("a mesh");
+    let analysis = Analysis::new(&input(&mesh, &flat), &welded, &Progress::new()).expect("a mesh");
     let error = analysis.unwrap(&Settings::default(), &Progress::new()).expect_err("not welded");
     assert!(matches!(error, UnwrapError::Setting { name: "weld", .. }), "{error}");
     for weld_distance in [None, Some(2e-3)] {
@@ -163,7 +160,7 @@ fn an_analysis_refuses_what_it_was_not_made_for() {
         assert!(error.to_string().contains("it must be what it was in the analysis"), "{error}");
     }
     for wrong in [-1.0, f64::NAN, f64::INFINITY] {
-        let options = ConditionOptions { weld: true, weld_distance: Some(wrong) };
+        let options = Settings { weld: true, weld_distance: Some(wrong), ..Settings::default() };
         let error = Analysis::new(&input(&mesh, &flat), &options, &Progress::new()).expect_err("no distance");
         assert!(matches!(error, UnwrapError::Setting { name: "weld_distance", .. }), "{error}");
     }

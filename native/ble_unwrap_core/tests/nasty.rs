@@ -1,10 +1,10 @@
 //! The whole pipeline on every kind of mesh: each result is proven, whatever went in.
 
-use ble_unwrap_core::mesh::{MeshInput, condition};
-use ble_unwrap_core::metrics::{Measures, Texture, UvMesh, measure};
-use ble_unwrap_core::{Atlas, Certificate, ChartScale, Holes, Progress, Settings, unwrap, verify};
+use ble_unwrap_core::internals::Layout;
+use ble_unwrap_core::settings::{ChartScale, Holes};
+use ble_unwrap_core::standalone::{ChartMeasures, Measures, certify, measure_layout};
+use ble_unwrap_core::{Atlas, Certificate, MeshInput, Progress, Settings, unwrap};
 use ble_unwrap_fixtures::{FlatPolygons, PolyMesh, book, catalogue, fin, grid, ico_sphere, sculpt_like, soup, torus};
-use nalgebra::Point3;
 use proptest::prelude::*;
 
 fn input<'a>(mesh: &'a PolyMesh, flat: &'a FlatPolygons) -> MeshInput<'a> {
@@ -18,35 +18,24 @@ fn input<'a>(mesh: &'a PolyMesh, flat: &'a FlatPolygons) -> MeshInput<'a> {
 }
 
 /// The certificate and the figures of an atlas, from the input alone: nothing of the pipeline's own is
-/// believed but its triangulation.
+/// believed but its conditioning.
 fn judge(input: &MeshInput<'_>, settings: &Settings, atlas: &Atlas) -> Result<(Certificate, Measures), String> {
     let progress = Progress::new();
     let polygons = input.face_offsets.len().saturating_sub(1);
     if atlas.uv.len() != input.corner_vertices.len() || atlas.chart.len() != polygons {
         return Err(format!("{} UVs, {} labels", atlas.uv.len(), atlas.chart.len()));
     }
-    let surface = condition(input, &settings.conditioning(), &progress).map_err(|e| e.to_string())?;
-    let unmapped: Vec<u32> = (0..polygons as u32).filter(|&p| atlas.chart[p as usize] < 0).collect();
-    if unmapped != surface.unmapped {
-        return Err(format!("{unmapped:?} without a chart, expected {:?}", surface.unmapped));
+    let finite = |face: &[i32]| {
+        let corners = face[0] as usize..face[1] as usize;
+        input.corner_vertices[corners].iter().flat_map(|&v| input.positions[v as usize]).all(f64::is_finite)
+    };
+    if let Some(p) = (0..polygons).find(|&p| finite(&input.face_offsets[p..p + 2]) != (atlas.chart[p] >= 0)) {
+        return Err(format!("face {p} has chart {}", atlas.chart[p]));
     }
-    let positions: Vec<Point3<f64>> = input.positions.iter().map(|&p| Point3::from(p)).collect();
-    // In the winding of the input, as a caller has them.
-    let corners: Vec<[u32; 3]> = surface
-        .corner
-        .chunks_exact(3)
-        .zip(&surface.reversed)
-        .map(|(c, &reversed)| if reversed { [c[0], c[2], c[1]] } else { [c[0], c[1], c[2]] })
-        .collect();
-    let triangles: Vec<[u32; 3]> =
-        corners.iter().map(|c| c.map(|c| input.corner_vertices[c as usize] as u32)).collect();
-    let chart: Vec<i32> = surface.polygon.iter().map(|&p| atlas.chart[p as usize]).collect();
-    let pack = &settings.packing;
-    let texture = Texture { width: pack.width, height: pack.height, margin: pack.margin_texels };
-    let mesh = UvMesh::new(&positions, &triangles, &atlas.uv, &corners, &chart, texture).map_err(|e| e.to_string())?;
-    let certificate = verify(&mesh, &surface.reversed, &progress).map_err(|e| e.to_string())?;
-    let measures = measure(&mesh, &progress).map_err(|e| e.to_string())?;
-    Ok((certificate, measures))
+    let certificate = certify(input, &atlas.uv, &atlas.chart, settings, &progress).map_err(|e| e.to_string())?;
+    let layout =
+        measure_layout(input, &atlas.uv, Some(&atlas.chart), settings, &progress).map_err(|e| e.to_string())?;
+    Ok((certificate, layout.measures))
 }
 
 /// Whether the report counts the charts that the labels tell apart.
@@ -67,7 +56,7 @@ fn check(input: &MeshInput<'_>, settings: &Settings, atlas: &Atlas) -> Result<Me
     if certificate.gap_texels < settings.packing.margin_texels {
         return Err(format!("a gap of {} texels", certificate.gap_texels));
     }
-    let unlisted = |c: &&ble_unwrap_core::metrics::ChartMeasures| {
+    let unlisted = |c: &&ChartMeasures| {
         c.l2 > settings.stretch_limit + 1e-3 && !atlas.report.charts_over_limit.iter().any(|o| o.0 as i32 == c.label)
     };
     if let Some(c) = measures.per_chart.iter().find(unlisted) {
@@ -171,7 +160,6 @@ fn faces_without_area_get_some() {
 /// The figures of an atlas by a fan of triangles over every face, those without area among them, under the vertex numbers
 /// of the input: as a reader sees it that knows nothing of how the mesh was conditioned.
 fn fanned(mesh: &PolyMesh, atlas: &Atlas) -> Measures {
-    let positions: Vec<Point3<f64>> = mesh.positions.iter().map(|&p| Point3::from(p)).collect();
     let offsets = mesh.flat().face_offsets;
     let fan = |f: usize| {
         let first = offsets[f] as u32;
@@ -180,9 +168,7 @@ fn fanned(mesh: &PolyMesh, atlas: &Atlas) -> Measures {
     let corners: Vec<[u32; 3]> = (0..mesh.faces.len()).flat_map(fan).collect();
     let vertex: Vec<u32> = mesh.faces.concat();
     let triangles: Vec<[u32; 3]> = corners.iter().map(|t| t.map(|c| vertex[c as usize])).collect();
-    let texture = Texture::square(2048, 4.0);
-    let layout = UvMesh::new(&positions, &triangles, &atlas.uv, &corners, &[], texture).expect("arrays that fit");
-    measure(&layout, &Progress::new()).expect("not cancelled")
+    Layout::new(&mesh.positions, triangles, corners, atlas.uv.clone(), Vec::new()).measure()
 }
 
 #[test]

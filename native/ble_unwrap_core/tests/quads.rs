@@ -2,12 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use ble_unwrap_core::mesh::ConditionOptions;
-use ble_unwrap_core::metrics::{Measures, Texture, UvMesh};
-use ble_unwrap_core::standalone::measure_layout;
-use ble_unwrap_core::{Atlas, MeshInput, Progress, Settings, unwrap, verify};
+use ble_unwrap_core::standalone::{Measures, certify, measure_layout};
+use ble_unwrap_core::{Atlas, MeshInput, Progress, Settings, unwrap};
 use ble_unwrap_fixtures::{FlatPolygons, PolyMesh, grid, voxels, wrapped_grid};
-use nalgebra::Point3;
 use rayon::ThreadPoolBuilder;
 
 /// By the other diagonal a result may be stretched so many times as much.
@@ -109,20 +106,11 @@ fn triangulated(mesh: &PolyMesh, first: usize) -> Vec<[i32; 3]> {
 /// Measured with these triangles, and proven to be free of flips and overlap with them.
 fn measured(mesh: &PolyMesh, atlas: &Atlas, triangles: &[[i32; 3]], name: &str) -> Measures {
     let flat = mesh.flat();
-    let positions: Vec<Point3<f64>> = mesh.positions.iter().map(|&p| Point3::from(p)).collect();
-    let by_corner: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|c| c as u32)).collect();
-    let by_vertex: Vec<[u32; 3]> =
-        by_corner.iter().map(|t| t.map(|c| flat.corner_vertices[c as usize] as u32)).collect();
-    let first_corners = &flat.face_offsets;
-    let face_of = |c: u32| first_corners.partition_point(|&f| f <= c as i32) - 1;
-    let chart: Vec<i32> = by_corner.iter().map(|t| atlas.chart[face_of(t[0])]).collect();
-    let texture = Texture::square(2048, 4.0);
-    let uv_mesh = UvMesh::new(&positions, &by_vertex, &atlas.uv, &by_corner, &chart, texture).expect("valid arrays");
-    let certificate = verify(&uv_mesh, &[], &Progress::new()).expect("not cancelled");
-    assert!(certificate.is_valid(), "{name}: {certificate:?}");
     let input = MeshInput { corner_triangles: Some(triangles), ..input_of(mesh, &flat) };
-    let layout = measure_layout(&input, &atlas.uv, None, &ConditionOptions::default(), texture, &Progress::new())
-        .expect("measures");
+    let (settings, progress) = (Settings::default(), Progress::new());
+    let certificate = certify(&input, &atlas.uv, &atlas.chart, &settings, &progress).expect("valid arrays");
+    assert!(certificate.is_valid(), "{name}: {certificate:?}");
+    let layout = measure_layout(&input, &atlas.uv, None, &settings, &progress).expect("measures");
     assert_eq!((layout.bent_quads, layout.unmapped_faces), (0, 0), "{name}");
     layout.measures
 }

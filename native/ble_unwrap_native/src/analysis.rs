@@ -33,12 +33,12 @@ pub(crate) struct Analysis {
 impl Analysis {
     #[getter]
     fn weld(&self) -> bool {
-        self.shared.conditioning().weld
+        self.shared.weld()
     }
 
     #[getter]
     fn weld_distance(&self) -> Option<f64> {
-        self.shared.conditioning().weld_distance
+        self.shared.weld_distance()
     }
 
     /// Unwrap the mesh: the function ``unwrap`` with its settings, of which ``weld`` and ``weld_distance`` can only be as in
@@ -150,7 +150,7 @@ pub(crate) fn analyse(
     let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, seams, guides)?;
     let job = Job::given_or_new(py, job)?;
     let work = move |progress: &_| {
-        ble_unwrap_core::Analysis::new(&mesh.input(), &call.settings.conditioning(), progress).map_err(Failure::from)
+        ble_unwrap_core::Analysis::new(&mesh.input(), &call.settings, progress).map_err(Failure::from)
     };
     let deliver = |py: Python<'_>, analysis| Ok(Py::new(py, Analysis { shared: Arc::new(analysis) })?.into_any());
     job.get().start(call.threads, work, deliver)?;

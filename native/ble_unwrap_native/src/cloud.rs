@@ -1,8 +1,7 @@
 //! `unwrap_points` and `submit_unwrap_points`: a point cloud in, an atlas of points out.
 
-use ble_unwrap_core::CloudReport;
-use ble_unwrap_core::cloud;
 use ble_unwrap_core::settings::{Function, NEIGHBOURS};
+use ble_unwrap_core::{self as core, CloudReport};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -52,7 +51,7 @@ impl PointAtlas {
 }
 
 /// An atlas of the core as one of Python.
-fn to_python(py: Python<'_>, atlas: cloud::PointAtlas) -> PyResult<Py<PyAny>> {
+fn to_python(py: Python<'_>, atlas: core::PointAtlas) -> PyResult<Py<PyAny>> {
     let uv = Py::new(py, Array::from_f32_rows(atlas.uv))?;
     let chart = Py::new(py, Array::from_i32(atlas.chart))?;
     let report = report_to_dict(py, &atlas.report)?.unbind();
@@ -156,13 +155,13 @@ pub(crate) fn submit_unwrap_points<'py>(
     let positions = arrays::real_rows(positions, Argument { name: "positions", shape: "(n, 3)" })?;
     let job = Job::given_or_new(py, job)?;
     let work = move |progress: &_| {
-        cloud::unwrap_points(&positions, neighbours, &call.settings, progress).map_err(Failure::from)
+        core::unwrap_points(&positions, neighbours, &call.settings, progress).map_err(Failure::from)
     };
     job.get().start(call.threads, work, to_python)?;
     Ok(job)
 }
 
-/// The report as a dictionary. Every field is named, so that a new one in the core is not forgotten here.
+/// The report as a dictionary. Every field is named; a test finds a new one of the core that is not.
 fn report_to_dict<'py>(py: Python<'py>, report: &CloudReport) -> PyResult<Bound<'py, PyDict>> {
     let CloudReport {
         points,
@@ -185,6 +184,7 @@ fn report_to_dict<'py>(py: Python<'py>, report: &CloudReport) -> PyResult<Bound<
         rungs,
         seconds,
         warnings,
+        ..
     } = report;
     let dict = PyDict::new(py);
     dict.set_item("points", points)?;

@@ -3,12 +3,8 @@
 use std::fmt::Display;
 
 use ble_unwrap_core::embedding::EmbeddingError;
-use ble_unwrap_core::memory::OutOfMemory;
-use ble_unwrap_core::mesh::MeshError;
-use ble_unwrap_core::packing::PackError;
 use ble_unwrap_core::standalone::{CloudDistancesError, DistancesError, FlattenError, LayoutError, RepackError};
-use ble_unwrap_core::stretch::StretchError;
-use ble_unwrap_core::{Certificate, CloudError, UnwrapError};
+use ble_unwrap_core::{self as core, Certificate, CloudError, ErrorKind, UnwrapError};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyMemoryError};
 use pyo3::prelude::*;
@@ -88,7 +84,7 @@ enum Kind {
 impl Failure {
     /// The computation saw that it was to stop.
     pub(crate) fn cancelled() -> Self {
-        ble_unwrap_core::Cancelled::OnRequest.into()
+        core::Cancelled::OnRequest.into()
     }
 
     /// The core panicked.
@@ -129,193 +125,51 @@ impl Failure {
     }
 }
 
-/// How an error of the core is raised. Exhaustive: a new variant in the core must be placed here.
-trait Raised: Display {
-    fn kind(&self) -> Kind;
-}
-
-impl<E: Raised> From<E> for Failure {
-    fn from(error: E) -> Self {
-        Self { kind: error.kind(), text: error.to_string() }
+impl Failure {
+    fn of(kind: ErrorKind, error: &dyn Display) -> Self {
+        let kind = match kind {
+            ErrorKind::Mesh => Kind::Mesh,
+            ErrorKind::Argument => Kind::Argument,
+            ErrorKind::Cancelled => Kind::Cancelled,
+            ErrorKind::OutOfMemory => Kind::Memory,
+            // One that cannot prove its result, but has no certificate to show, does not keep its word.
+            ErrorKind::Unproven | ErrorKind::Internal => Kind::Internal,
+        };
+        Self { kind, text: error.to_string() }
     }
 }
 
-impl Raised for ble_unwrap_core::Cancelled {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::OnRequest => Kind::Cancelled,
-            Self::OutOfMemory(error) => error.kind(),
+impl From<UnwrapError> for Failure {
+    fn from(error: UnwrapError) -> Self {
+        let failure = Self::of(error.kind(), &error);
+        match error {
+            UnwrapError::Unproven(certificate) => Self { kind: Kind::Unproven(certificate), ..failure },
+            _ => failure,
         }
     }
 }
 
-impl Raised for OutOfMemory {
-    fn kind(&self) -> Kind {
-        Kind::Memory
-    }
+/// Errors that say all there is to know by their kind and their text.
+macro_rules! raised {
+    ($($error:ty),+) => {
+        $(impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self::of(error.kind(), &error)
+            }
+        })+
+    };
 }
 
-impl Raised for MeshError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::OffsetsStart { .. }
-            | Self::OffsetsEnd { .. }
-            | Self::OffsetsMissing { .. }
-            | Self::OffsetsDescend { .. }
-            | Self::TooFewCorners { .. }
-            | Self::VertexOutOfRange { .. }
-            | Self::TriangleCornerOutOfRange { .. }
-            | Self::TriangleAcrossFaces { .. }
-            | Self::SeamOutOfRange { .. }
-            | Self::GuideOutOfRange { .. }
-            | Self::TooLarge { .. }
-            | Self::NoFiniteFace { .. } => Kind::Mesh,
-            Self::Cancelled(error) => error.kind(),
-        }
-    }
-}
-
-impl Raised for PackError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::TextureSize { .. }
-            | Self::Margin { .. }
-            | Self::MarginTooLarge { .. }
-            | Self::TooManyCharts { .. }
-            | Self::NotFinite { .. }
-            | Self::CornerOutOfRange { .. } => Kind::Argument,
-            Self::Cancelled(error) => error.kind(),
-        }
-    }
-}
-
-impl Raised for UnwrapError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Mesh(error) => error.kind(),
-            Self::Setting { .. } => Kind::Argument,
-            Self::Pack(error) => error.kind(),
-            Self::Check(_) => Kind::Mesh,
-            Self::Unproven(certificate) => Kind::Unproven(certificate.clone()),
-            Self::OutOfMemory(error) => error.kind(),
-            Self::Cancelled(error) => error.kind(),
-        }
-    }
-}
-
-impl Raised for CloudError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Setting(error) => error.kind(),
-            Self::Pack(error) => error.kind(),
-            Self::Neighbours { .. }
-            | Self::NoFinitePoint { .. }
-            | Self::TooLarge { .. }
-            | Self::TooManySpecks { .. } => Kind::Argument,
-            Self::Cancelled(error) => error.kind(),
-        }
-    }
-}
-
-impl Raised for EmbeddingError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::TooFewLandmarks { .. }
-            | Self::Unreachable { .. }
-            | Self::NoExtent
-            | Self::Collinear { .. }
-            | Self::InvalidSetting { .. }
-            | Self::WrongLength { .. }
-            | Self::NotFinite { .. }
-            | Self::DistanceOutOfRange { .. }
-            | Self::AffinityOutOfRange { .. }
-            | Self::TooFewPoints { .. }
-            | Self::OutOfScale { .. }
-            | Self::TooFewPlaces { .. }
-            | Self::StartNotFinite { .. }
-            | Self::StartAtSaddle
-            | Self::Disconnected { .. }
-            | Self::TooManyPoints { .. }
-            | Self::WrongColumns { .. } => Kind::Argument,
-            Self::Eigen(_) => Kind::Internal,
-            Self::Cancelled(error) => error.kind(),
-        }
-    }
-}
-
-impl Raised for DistancesError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Mesh(error) => error.kind(),
-            Self::Source { .. } | Self::TooLarge { .. } => Kind::Argument,
-            Self::Cancelled(error) => error.kind(),
-        }
-    }
-}
-
-impl Raised for FlattenError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Mesh(error) => error.kind(),
-            Self::Setting(error) => error.kind(),
-            Self::NoFaces
-            | Self::NoArea
-            | Self::NotFinite { .. }
-            | Self::Pieces { .. }
-            | Self::Closed
-            | Self::Handles { .. }
-            | Self::Pinched { .. }
-            | Self::DoubledEdge { .. } => Kind::Mesh,
-            Self::TooManyLandmarks { .. } => Kind::Argument,
-            // The data are distances of the mesh: what is wrong with them is wrong with it.
-            Self::Embedding(
-                EmbeddingError::TooFewLandmarks { .. }
-                | EmbeddingError::Unreachable { .. }
-                | EmbeddingError::NoExtent
-                | EmbeddingError::Collinear { .. },
-            ) => Kind::Mesh,
-            Self::Embedding(error) => error.kind(),
-            Self::Stretch(StretchError::NotInjective) => Kind::Mesh,
-            Self::Stretch(_) => Kind::Internal,
-            Self::Cancelled(error) => error.kind(),
-        }
-    }
-}
-
-impl Raised for CloudDistancesError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::WrongLength { .. }
-            | Self::NotFinite { .. }
-            | Self::Source { .. }
-            | Self::NoNeighbours
-            | Self::TooLarge { .. }
-            | Self::Disconnected(_) => Kind::Argument,
-            Self::Cancelled(error) => error.kind(),
-        }
-    }
-}
-
-impl Raised for LayoutError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Mesh(error) => error.kind(),
-            Self::UvCount { .. } | Self::ChartCount { .. } => Kind::Argument,
-            Self::Triangles(_) => Kind::Mesh,
-            Self::Cancelled(error) => error.kind(),
-        }
-    }
-}
-
-impl Raised for RepackError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::ChartCount { .. } | Self::PointOutOfRange { .. } | Self::SharedPoint { .. } => Kind::Argument,
-            Self::Pack(error) => error.kind(),
-            Self::Cancelled(error) => error.kind(),
-        }
-    }
-}
+raised!(
+    core::Cancelled,
+    CloudError,
+    CloudDistancesError,
+    DistancesError,
+    EmbeddingError,
+    FlattenError,
+    LayoutError,
+    RepackError
+);
 
 /// Adds the exceptions to the module.
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -1,7 +1,6 @@
 //! `flatten`: one patch to one chart, step by step.
 
-use ble_unwrap_core::Choice;
-use ble_unwrap_core::settings::Function;
+use ble_unwrap_core::settings::{Choice, Function};
 use ble_unwrap_core::standalone::{self, FlattenReport, MapQuality};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
@@ -162,6 +161,7 @@ fn to_dict<'py>(py: Python<'py>, report: &FlattenReport) -> PyResult<Bound<'py, 
         stretch_iterations,
         boundary_is_simple,
         seconds,
+        ..
     } = report;
     let dict = PyDict::new(py);
     dict.set_item("model", model.word())?;
@@ -174,7 +174,7 @@ fn to_dict<'py>(py: Python<'py>, report: &FlattenReport) -> PyResult<Bound<'py, 
     dict.set_item("log_likelihood", log_likelihood)?;
     dict.set_item("trace", trace)?;
     for (when, quality) in [("before", before), ("after", after)] {
-        let MapQuality { flips, l2, l_infinity, distance_correlation } = quality;
+        let MapQuality { flips, l2, l_infinity, distance_correlation, .. } = quality;
         dict.set_item(format!("flips_{when}"), flips)?;
         dict.set_item(format!("l2_{when}"), l2)?;
         dict.set_item(format!("l_infinity_{when}"), l_infinity)?;

@@ -1,6 +1,5 @@
 //! `measure`.
 
-use ble_unwrap_core::metrics::Texture;
 use ble_unwrap_core::settings::Function;
 use ble_unwrap_core::standalone::measure_layout;
 use pyo3::prelude::*;
@@ -78,15 +77,11 @@ pub(crate) fn measure(
     let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, None, None)?;
     let uv = arrays::single_rows(uv, Argument { name: "uv", shape: "(c, 2)" })?;
     let chart = chart.map(|given| arrays::indices(given, Argument { name: "chart", shape: "(f,)" })).transpose()?;
-    let conditioning = call.settings.conditioning();
-    let packing = call.settings.packing;
-    let texture = Texture { width: packing.width, height: packing.height, margin: packing.margin_texels };
     let job = Job::given_or_new(py, job)?;
     job.get().start(
         call.threads,
         move |progress| {
-            measure_layout(&mesh.input(), &uv, chart.as_deref(), &conditioning, texture, progress)
-                .map_err(Failure::from)
+            measure_layout(&mesh.input(), &uv, chart.as_deref(), &call.settings, progress).map_err(Failure::from)
         },
         |py, layout| Ok(report::measures_to_dict(py, layout)?.into_any().unbind()),
     )?;

@@ -92,17 +92,18 @@ pub(crate) fn pack(
     let points = arrays::real_rows(points, Argument { name: "points", shape: "(n, 2)" })?;
     let triangles = arrays::index_rows(triangles, Argument { name: "triangles", shape: "(t, 3)" })?;
     let chart = arrays::indices(chart, Argument { name: "chart", shape: "(t,)" })?;
+    let size = (call.settings.packing.width, call.settings.packing.height);
     let job = Job::given_or_new(py, job)?;
     job.get().start(
         call.threads,
         move |progress| repack(&points, &triangles, &chart, &call.settings.packing, progress).map_err(Failure::from),
-        |py, repacked| {
+        move |py, repacked| {
             let report = PyDict::new(py);
             report.set_item("charts", repacked.charts)?;
-            report.set_item("packing_efficiency", repacked.packed.efficiency)?;
-            report.set_item("texels_per_unit", repacked.packed.texels_per_unit)?;
-            report.set_item("texture_size", (repacked.packed.size[0], repacked.packed.size[1]))?;
-            report.set_item("specks", repacked.packed.specks)?;
+            report.set_item("packing_efficiency", repacked.efficiency)?;
+            report.set_item("texels_per_unit", repacked.texels_per_unit)?;
+            report.set_item("texture_size", size)?;
+            report.set_item("specks", repacked.specks)?;
             let uv = Py::new(py, Array::from_f32_rows(repacked.uv))?;
             Ok(Py::new(py, PackedCharts { uv, report: report.unbind() })?.into_any())
         },

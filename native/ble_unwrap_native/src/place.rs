@@ -1,8 +1,7 @@
 //! `place`: further points among landmarks that are plain arrays.
 
-use ble_unwrap_core::Choice;
 use ble_unwrap_core::embedding::{self, Evidence, FittedLandmarks, Model};
-use ble_unwrap_core::settings::Function;
+use ble_unwrap_core::settings::{Choice, Function};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

@@ -1,8 +1,8 @@
 //! Settings by keyword: a Python value for each row of the core's table, which says all that there is to say of a setting.
 
-use ble_unwrap_core::Settings;
-use ble_unwrap_core::settings::{Function, Kind, Preset, Setting, TABLE, THREADS, Value, listed};
-use ble_unwrap_core::{Choice, Named};
+use ble_unwrap_core::settings::{
+    Choice, Function, Kind, Named, Preset, Setting, Settings, TABLE, THREADS, Value, listed,
+};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyBytes, PyDict, PyString};
 

@@ -37,7 +37,7 @@ const LEAST_WEIGHT: f64 = 1e-9;
 /// Edges for which `forbidden` holds are not cut. This is always possible if the faces across them form
 /// no cycle, as with the diagonals of polygons; otherwise as few as the method can are cut all the same.
 /// O(n log n) times at most eight.
-pub fn cut_open(
+pub(crate) fn cut_open(
     mesh: &TriMesh,
     weight: impl Fn(HalfedgeId) -> f64,
     forbidden: impl Fn(HalfedgeId) -> bool,
@@ -49,7 +49,7 @@ pub fn cut_open(
 /// and, by a spanning tree of shortest paths, more to join all boundary loops into one.
 ///
 /// Order, `weight` and `forbidden` as for [`cut_open`]. O(n log n).
-pub fn cut_to_disk(
+pub(crate) fn cut_to_disk(
     mesh: &TriMesh,
     weight: impl Fn(HalfedgeId) -> f64,
     forbidden: impl Fn(HalfedgeId) -> bool,
@@ -69,7 +69,7 @@ pub fn cut_to_disk(
 ///
 /// # Panics
 /// If `from` is no vertex of the mesh.
-pub fn shortest_path_to_boundary(
+pub(crate) fn shortest_path_to_boundary(
     mesh: &TriMesh,
     from: VertexId,
     root: Option<VertexId>,

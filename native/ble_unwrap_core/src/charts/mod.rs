@@ -6,5 +6,5 @@
 mod cut_to_disk;
 mod patch;
 
-pub use cut_to_disk::{cut_open, cut_to_disk, shortest_path_to_boundary};
-pub use patch::{Chart, Patch};
+pub(crate) use cut_to_disk::{cut_open, cut_to_disk, shortest_path_to_boundary};
+pub(crate) use patch::{Chart, Patch};

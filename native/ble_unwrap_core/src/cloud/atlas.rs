@@ -6,6 +6,7 @@ use thiserror::Error;
 
 /// A UV for every point of a cloud.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct PointAtlas {
     /// One UV a point, in [0, 1]²; (0, 0) for points whose position is not finite.
     pub uv: Vec<[f32; 2]>,
@@ -15,9 +16,10 @@ pub struct PointAtlas {
     pub report: CloudReport,
 }
 
-/// Quality and history of an atlas of points. Stretch as in [`crate::distortion`], of the least-squares map of each
-/// point's neighbourhood in its tangent plane; points whose neighbours lie on a line have none.
+/// Quality and history of an atlas of points. Stretch is that of the least-squares map of each point's neighbourhood in
+/// its tangent plane to the texture: with σ₁ ≥ σ₂ its singular values, the squared L2 stretch is ½(1/σ₁² + 1/σ₂²); points whose neighbours lie on a line have none.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct CloudReport {
     /// Number of points.
     pub points: usize,
@@ -63,6 +65,7 @@ pub struct CloudReport {
 
 /// A rule that an atlas of points breaks.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum PointDefect {
     /// Not one UV and one chart a point.
     #[error("there are {uvs} UVs and {charts} chart numbers for {points} points")]

@@ -3,12 +3,14 @@
 use thiserror::Error;
 
 use crate::error::UnwrapError;
+use crate::error_kind::ErrorKind;
 use crate::packing::PackError;
 use crate::progress::Cancelled;
 use crate::settings::NEIGHBOURS;
 
 /// Why there is no atlas of a point cloud. The text names the offending element and the remedy.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum CloudError {
     /// A setting is out of its range.
     #[error(transparent)]
@@ -52,6 +54,22 @@ pub enum CloudError {
     /// The caller asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl CloudError {
+    /// What kind of error this is.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Setting(error) => error.kind(),
+            Self::Pack(error) => error.kind(),
+            Self::Neighbours { .. }
+            | Self::NoFinitePoint { .. }
+            | Self::TooLarge { .. }
+            | Self::TooManySpecks { .. } => ErrorKind::Argument,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
 }
 
 impl From<PackError> for CloudError {

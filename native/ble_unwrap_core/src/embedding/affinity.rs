@@ -5,12 +5,12 @@ use rayon::prelude::*;
 use crate::progress::Progress;
 
 use super::EmbeddingError;
-use super::logistic::{logistic, logistic_pair};
+use super::logistic::logistic_pair;
 use super::square_matrix::square_matrix;
 
 /// How affinity falls with distance d, for a kernel width σ in units of squared distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kernel {
+pub(super) enum Kernel {
     /// p = exp(−d²/2σ), from 1 (paper, equations 5 and 13).
     Gaussian,
     /// p = 1/(1 + exp(d²/2σ)), from ½: its log-odds are −d²/2σ, which a model with intercepts
@@ -22,7 +22,7 @@ impl Kernel {
     /// Affinity of two points with d²/2σ = `u` ≥ 0.
     #[inline]
     #[must_use]
-    pub fn affinity(self, u: f64) -> f64 {
+    pub(super) fn affinity(self, u: f64) -> f64 {
         match self {
             Self::Gaussian => {
                 let (large, small) = logistic_pair(u);
@@ -74,6 +74,7 @@ impl Kernel {
 
 /// How the kernel width σ is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum KernelWidth {
     /// σ itself, in units of squared distance.
     Absolute(f64),
@@ -88,7 +89,7 @@ impl KernelWidth {
     ///
     /// # Errors
     /// [`EmbeddingError::InvalidSetting`] where no positive σ can follow.
-    pub fn validate(self, kernel: Kernel) -> Result<(), EmbeddingError> {
+    pub(super) fn validate(self, kernel: Kernel) -> Result<(), EmbeddingError> {
         match self {
             Self::Absolute(value) if !(value > 0.0 && value.is_finite()) => {
                 Err(EmbeddingError::InvalidSetting { name: "sigma", value, expected: "positive and finite" })
@@ -110,7 +111,7 @@ impl KernelWidth {
 
 /// A symmetric n×n matrix of affinities in [0, 1]; the diagonal is never looked at.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Affinity {
+pub(super) struct Affinity {
     n: usize,
     values: Vec<f64>,
     sigma: f64,
@@ -122,7 +123,7 @@ impl Affinity {
     ///
     /// # Errors
     /// [`EmbeddingError::WrongLength`]; [`EmbeddingError::AffinityOutOfRange`] names the first pair outside [0, 1].
-    pub fn from_matrix(matrix: &[f64], n: usize) -> Result<Self, EmbeddingError> {
+    pub(super) fn from_matrix(matrix: &[f64], n: usize) -> Result<Self, EmbeddingError> {
         check_square(matrix, n)?;
         for row in 0..n {
             for column in 0..n {
@@ -161,7 +162,7 @@ impl Affinity {
     ///
     /// # Errors
     /// As [`KernelWidth::validate`] and [`kernel_width`]; [`EmbeddingError::WrongLength`].
-    pub fn from_squared_distances(
+    pub(super) fn from_squared_distances(
         squared: &[f64],
         n: usize,
         kernel: Kernel,
@@ -180,38 +181,32 @@ impl Affinity {
 
     /// Replaces affinities below `least` by 0 (the truncated kernel of the paper, section 3).
     #[must_use]
-    pub fn truncated(mut self, least: f64) -> Self {
+    pub(super) fn truncated(mut self, least: f64) -> Self {
         self.values.iter_mut().filter(|p| **p < least).for_each(|p| *p = 0.0);
         self
     }
 
     /// Number of points n.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.n
-    }
-
-    /// Whether there are no points.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.n == 0
     }
 
     /// The kernel width σ, in units of squared distance.
     #[must_use]
-    pub fn sigma(&self) -> f64 {
+    pub(super) fn sigma(&self) -> f64 {
         self.sigma
     }
 
     /// The affinities of point `i` to all points.
     #[must_use]
-    pub fn row(&self, i: usize) -> &[f64] {
+    pub(super) fn row(&self, i: usize) -> &[f64] {
         &self.values[i * self.n..(i + 1) * self.n]
     }
 
     /// Mean over all pairs i ≠ j; 0 where there are none.
     #[must_use]
-    pub fn mean(&self) -> f64 {
+    pub(super) fn mean(&self) -> f64 {
         let total: f64 = (0..self.n).map(|i| self.row(i)[..i].iter().sum::<f64>()).sum();
         total / pair_count(self.n).max(1.0)
     }
@@ -219,7 +214,7 @@ impl Affinity {
     /// Σ_{i≠j} p log p + (1−p) log(1−p): the log-likelihood (4) of a model that fits every pair
     /// exactly, so the Bregman distance (12) is this less the log-likelihood.
     #[must_use]
-    pub fn saturated_log_likelihood(&self) -> f64 {
+    pub(super) fn saturated_log_likelihood(&self) -> f64 {
         let term = |p: f64| if p > 0.0 { p * p.ln() } else { 0.0 };
         let row = |i: usize| self.row(i)[..i].iter().map(|&p| term(p) + term(1.0 - p)).sum::<f64>();
         2.0 * (0..self.n).map(row).sum::<f64>()
@@ -232,7 +227,7 @@ impl Affinity {
 /// # Errors
 /// As [`KernelWidth::validate`]; [`EmbeddingError::NoExtent`] where all distances are zero;
 /// cancelled.
-pub fn kernel_width(
+pub(super) fn kernel_width(
     squared: &[f64],
     n: usize,
     kernel: Kernel,
@@ -335,12 +330,6 @@ pub(super) fn squared_distances(affinity: &Affinity, kernel: Kernel) -> Vec<f64>
         }
     }
     squared
-}
-
-/// The model's affinity for given log-odds (paper, equation 2).
-#[must_use]
-pub fn model_affinity(log_odds: f64) -> f64 {
-    logistic(log_odds)
 }
 
 #[cfg(test)]

@@ -32,7 +32,7 @@ use super::logistic::{Curvature, Quarter, Tight};
 
 /// What the log-odds of a pair are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LogitModel {
+pub(super) enum LogitModel {
     /// x_i·x_j + a_i + a_j, fitted with the tight bound (q−½)/t. Invariant under rigid motions.
     WithIntercepts,
     /// x_i·x_j as printed, fitted with the paper's bound ¼. Invariant under rotations about 0.
@@ -41,6 +41,7 @@ pub enum LogitModel {
 
 /// Order of the block updates in a sweep (paper, section 4.2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Update {
     /// One after the other, each seeing those before it: τ = t+1. Monotone for any ω in (0, 2).
     Serial,
@@ -55,7 +56,7 @@ choices!(Update {
 
 /// Parameters of [`fit`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FitOptions {
+pub(super) struct FitOptions {
     /// The model.
     pub model: LogitModel,
     /// Serial or parallel updates.
@@ -83,7 +84,7 @@ impl Default for FitOptions {
 impl FitOptions {
     /// # Errors
     /// [`EmbeddingError::InvalidSetting`] names the first parameter out of range.
-    pub fn validate(&self) -> Result<(), EmbeddingError> {
+    pub(super) fn validate(&self) -> Result<(), EmbeddingError> {
         if !(self.relaxation > 0.0 && self.relaxation < 2.0) {
             let expected = "above 0 and below 2";
             return Err(EmbeddingError::InvalidSetting { name: "relaxation", value: self.relaxation, expected });
@@ -101,7 +102,7 @@ impl FitOptions {
 
 /// A fitted model.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fit {
+pub(super) struct Fit {
     /// Number of dimensions q.
     pub dimensions: usize,
     /// The n×q coordinates, row by row, without units: times √σ they are in units of distance
@@ -139,7 +140,7 @@ const LONGEST_EARLY_STEP: f64 = 1.0;
 /// # Errors
 /// [`EmbeddingError::InvalidSetting`], [`EmbeddingError::WrongLength`],
 /// [`EmbeddingError::NotFinite`] for the start, cancelled.
-pub fn fit(
+pub(super) fn fit(
     affinity: &Affinity,
     dimensions: usize,
     coordinates: &[f64],
@@ -316,8 +317,9 @@ fn parallel<B: Blocks, C: Curvature>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::affinity::{Kernel, KernelWidth, model_affinity};
+    use super::super::affinity::{Kernel, KernelWidth};
     use super::super::flat_shapes::{misfit, rectangle};
+    use super::super::logistic::logistic;
     use super::super::random::normal;
     use super::*;
 
@@ -326,7 +328,7 @@ mod tests {
     }
 
     fn random_problem(n: usize, q: usize, seed: u64) -> (Affinity, Vec<f64>) {
-        let p: Vec<f64> = (0..n * n).map(|k| model_affinity(2.0 * normal(seed, k as u64))).collect();
+        let p: Vec<f64> = (0..n * n).map(|k| logistic(2.0 * normal(seed, k as u64))).collect();
         let start = (0..n * q).map(|k| 0.5 * normal(!seed, k as u64)).collect();
         (Affinity::from_matrix(&p, n).expect("in range"), start)
     }

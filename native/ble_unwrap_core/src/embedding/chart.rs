@@ -4,7 +4,7 @@ use nalgebra::Point2;
 use rayon::prelude::*;
 
 use crate::geodesics::LandmarkDistances;
-use crate::linalg::{EigenError, Mds, leading_mds};
+use crate::linalg::{Mds, leading_mds};
 use crate::mesh::VertexId;
 use crate::progress::Progress;
 
@@ -27,7 +27,7 @@ const RANDOM_DEVIATION: f64 = 0.5;
 
 /// A chart in the plane, before its gauge is fixed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ChartEmbedding {
+pub(crate) struct ChartEmbedding {
     /// A position a vertex, in units of the surface; side, direction and place are arbitrary, and so is the
     /// scale of the printed model.
     pub uv: Vec<Point2<f64>>,
@@ -58,7 +58,7 @@ pub struct ChartEmbedding {
 /// [`EmbeddingError::Unreachable`] names the first infinite distance; [`EmbeddingError::NoExtent`];
 /// [`EmbeddingError::Collinear`] where classical scaling finds the landmarks thinner than 1 : 10,000
 /// (a random start does not look); cancelled.
-pub fn embed_chart(
+pub(crate) fn embed_chart(
     distances: &LandmarkDistances,
     settings: &EmbeddingSettings,
     seed: u64,
@@ -127,8 +127,8 @@ fn mean_squared_distance(distances: &LandmarkDistances) -> Result<f64, Embedding
     for (l, sum) in sums.iter().enumerate() {
         // Squares of single precision cannot overflow in double: only an infinite or undefined distance can.
         if let Some(v) = distances.row(l).iter().position(|d| !d.is_finite()).filter(|_| !sum.is_finite()) {
-            let (landmark, vertex) = (distances.landmarks()[l], VertexId::new(v));
-            let value = distances.get(l, vertex);
+            let value = distances.get(l, VertexId::new(v));
+            let (landmark, vertex) = (distances.landmarks()[l].index(), v);
             return Err(EmbeddingError::Unreachable { landmark, vertex, value });
         }
     }
@@ -139,10 +139,7 @@ fn mean_squared_distance(distances: &LandmarkDistances) -> Result<f64, Embedding
 
 /// Classical scaling of the landmarks, which must span a plane.
 fn planar_mds(squared: &[f64], k: usize, progress: &Progress) -> Result<Mds, EmbeddingError> {
-    let mds = leading_mds(squared, k, 2, SCALING_TOLERANCE, progress).map_err(|error| match error {
-        EigenError::Cancelled(cancelled) => EmbeddingError::Cancelled(cancelled),
-        other => EmbeddingError::Eigen(other),
-    })?;
+    let mds = leading_mds(squared, k, 2, SCALING_TOLERANCE, progress).map_err(EmbeddingError::of_eigenvalues)?;
     let [first, second] = [mds.eigenvalues[0], mds.eigenvalues[1].max(0.0)];
     if first.is_nan() || first <= 0.0 {
         return Err(EmbeddingError::NoExtent);
@@ -300,7 +297,7 @@ mod tests {
         assert_eq!(run(9, 6, &|_, _| 0.0), Err(EmbeddingError::NoExtent));
         assert_eq!(run(3, 3, &|_, _| 0.0), Err(EmbeddingError::NoExtent));
         let torn = |l: usize, v: usize| if v == 7 { f32::INFINITY } else { line(l, v) };
-        let (landmark, vertex) = (VertexId::new(0), VertexId::new(7));
+        let (landmark, vertex) = (0, 7);
         let value = f64::INFINITY;
         assert_eq!(run(9, 6, &torn), Err(EmbeddingError::Unreachable { landmark, vertex, value }));
         let nan = |_: usize, v: usize| if v == 7 { f32::NAN } else { 1.0 };

@@ -216,7 +216,8 @@ impl Task<'_> {
         let start = if self.options.start.is_none() && self.settings.initial == Initial::Mds {
             // Classical scaling of the landmarks, and everything else by its distances to them.
             let q = self.options.dimensions;
-            let mds = leading_mds(&among, landmarks.len(), q, START_TOLERANCE, self.progress)?;
+            let mds = leading_mds(&among, landmarks.len(), q, START_TOLERANCE, self.progress)
+                .map_err(EmbeddingError::of_eigenvalues)?;
             let placer = Placer::Scaling { mds, kernel: self.kernel };
             let observe = |i: usize, row: &mut [f64]| source.observe(&seen, i, row);
             let placed = placer.place(n, q, Evidence::SquaredDistances, observe, self.progress)?;
@@ -265,7 +266,8 @@ impl Task<'_> {
                 if self.settings.model == Model::Default && points.len() > STARTED_BY_LANDMARKS {
                     return self.landmark_start(&squared, points.len(), affinity.sigma());
                 }
-                let mds = leading_mds(&squared, points.len(), q, START_TOLERANCE, self.progress)?;
+                let mds = leading_mds(&squared, points.len(), q, START_TOLERANCE, self.progress)
+                    .map_err(EmbeddingError::of_eigenvalues)?;
                 Ok(mds_start(&mds, affinity.sigma().sqrt(), q))
             }
         }
@@ -281,7 +283,7 @@ impl Task<'_> {
             landmarks.iter().flat_map(|i| landmarks.iter().map(move |j| squared[i * n + j])).collect();
         let width = KernelWidth::Absolute(sigma);
         let affinity = Affinity::from_squared_distances(&among, k, self.kernel, width, self.progress)?;
-        let mds = leading_mds(&among, k, q, START_TOLERANCE, self.progress)?;
+        let mds = leading_mds(&among, k, q, START_TOLERANCE, self.progress).map_err(EmbeddingError::of_eigenvalues)?;
         let (coordinates, intercepts) = mds_start(&mds, sigma.sqrt(), q);
         let options = self.settings.fit_options();
         let fit = fit(&affinity, q, &coordinates, &intercepts, &options, self.progress)?;
@@ -341,7 +343,8 @@ impl Task<'_> {
         reference: Option<Reference>,
     ) -> Result<Embedding, EmbeddingError> {
         let (q, k) = (self.options.dimensions, points.len());
-        let mds = leading_mds(squared, k, q, ISOMAP_TOLERANCE, self.progress)?;
+        let mds =
+            leading_mds(squared, k, q, ISOMAP_TOLERANCE, self.progress).map_err(EmbeddingError::of_eigenvalues)?;
         if mds.dimensions == 0 {
             return Err(EmbeddingError::NoExtent);
         }

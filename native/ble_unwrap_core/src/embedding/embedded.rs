@@ -9,6 +9,7 @@ use super::source::Reference;
 
 /// Points in few dimensions, how they were found, and what places further points among them.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Embedding {
     /// Number of dimensions q.
     pub dimensions: usize,

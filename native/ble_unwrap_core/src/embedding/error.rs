@@ -2,13 +2,14 @@
 
 use thiserror::Error;
 
+use crate::error_kind::ErrorKind;
 use crate::linalg::EigenError;
 use crate::memory;
-use crate::mesh::VertexId;
 use crate::progress::Cancelled;
 
 /// Why there is no embedding.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum EmbeddingError {
     /// Fewer than three landmarks do not span a plane.
     #[error("{found} landmarks do not span a plane; at least 3 are needed")]
@@ -17,12 +18,12 @@ pub enum EmbeddingError {
         found: usize,
     },
     /// No path leads from a landmark to a vertex: the chart is not connected, or the distance is no number.
-    #[error("the distance from landmark {landmark} to {vertex} is {value}: the chart is not connected")]
+    #[error("the distance from landmark {landmark} to vertex {vertex} is {value}: the chart is not connected")]
     Unreachable {
         /// The landmark.
-        landmark: VertexId,
+        landmark: usize,
         /// The vertex.
-        vertex: VertexId,
+        vertex: usize,
         /// The distance found.
         value: f64,
     },
@@ -157,18 +158,47 @@ pub enum EmbeddingError {
         found: usize,
     },
     /// The eigenvalues of the double-centred distances could not be had.
-    #[error(transparent)]
-    Eigen(EigenError),
+    #[error("the eigenvalues of the double-centred distances could not be computed")]
+    NoEigenvalues,
     /// Asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
 
-impl From<EigenError> for EmbeddingError {
-    fn from(error: EigenError) -> Self {
+impl EmbeddingError {
+    /// What kind of error this is.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::TooFewLandmarks { .. }
+            | Self::Unreachable { .. }
+            | Self::NoExtent
+            | Self::Collinear { .. }
+            | Self::InvalidSetting { .. }
+            | Self::WrongLength { .. }
+            | Self::NotFinite { .. }
+            | Self::DistanceOutOfRange { .. }
+            | Self::AffinityOutOfRange { .. }
+            | Self::TooFewPoints { .. }
+            | Self::OutOfScale { .. }
+            | Self::TooFewPlaces { .. }
+            | Self::StartNotFinite { .. }
+            | Self::StartAtSaddle
+            | Self::Disconnected { .. }
+            | Self::TooManyPoints { .. }
+            | Self::WrongColumns { .. } => ErrorKind::Argument,
+            Self::NoEigenvalues => ErrorKind::Internal,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
+impl EmbeddingError {
+    /// Why eigenvalues are missing.
+    pub(super) fn of_eigenvalues(error: EigenError) -> Self {
         match error {
             EigenError::Cancelled(cancelled) => Self::Cancelled(cancelled),
-            EigenError::NotFinite { .. } | EigenError::NoConvergence => Self::Eigen(error),
+            EigenError::NotFinite { .. } | EigenError::NoConvergence => Self::NoEigenvalues,
         }
     }
 }

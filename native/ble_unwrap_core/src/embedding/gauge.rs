@@ -17,7 +17,7 @@ use crate::mesh::TriMesh;
 ///
 /// # Panics
 /// If `uv` or `rest` have the wrong length.
-pub fn fix_gauge(mesh: &TriMesh, rest: &[RestTriangle], uv: &mut [Point2<f64>]) {
+pub(crate) fn fix_gauge(mesh: &TriMesh, rest: &[RestTriangle], uv: &mut [Point2<f64>]) {
     assert_eq!(rest.len(), mesh.face_count(), "one rest triangle a face");
     assert_eq!(uv.len(), mesh.vertex_count(), "one position a vertex");
     let mut weight = vec![0.0; uv.len()];

@@ -4,6 +4,7 @@ use super::error::EmbeddingError;
 
 /// How the distances of points are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PointMetric {
     /// Straight (paper, equation 5).
     Euclidean,
@@ -16,6 +17,7 @@ pub enum PointMetric {
 
 /// What is to be embedded.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum EmbedInput<'a> {
     /// n points of p coordinates, row by row.
     Points {

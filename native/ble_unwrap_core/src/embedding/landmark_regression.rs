@@ -37,6 +37,7 @@ const CHUNK: usize = 64;
 
 /// What is known of a new point and each landmark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Evidence {
     /// Squared distances.
     SquaredDistances,
@@ -46,7 +47,7 @@ pub enum Evidence {
 
 /// Landmarks with their fitted parameters, ready to place further points.
 #[derive(Clone, Debug)]
-pub struct LandmarkModel {
+pub(super) struct LandmarkModel {
     landmarks: Landmarks,
     dimensions: usize,
     kernel: Kernel,
@@ -366,7 +367,7 @@ impl LandmarkModel {
     /// From k×q coordinates and k intercepts (none for the printed model), as a fit gives them, with the kernel
     /// and width of its affinities.
     #[must_use]
-    pub fn new(dimensions: usize, coordinates: &[f64], intercepts: &[f64], kernel: Kernel, sigma: f64) -> Self {
+    pub(super) fn new(dimensions: usize, coordinates: &[f64], intercepts: &[f64], kernel: Kernel, sigma: f64) -> Self {
         let with = !intercepts.is_empty();
         let k = coordinates.len().checked_div(dimensions).unwrap_or(0);
         let a = if with { intercepts.to_vec() } else { vec![0.0; k] };
@@ -384,31 +385,25 @@ impl LandmarkModel {
     ///
     /// Vertices of a chart, whose landmarks cover it, need neither.
     #[must_use]
-    pub fn anchored(mut self) -> Self {
+    pub(super) fn anchored(mut self) -> Self {
         self.anchored = true;
         self
     }
 
     /// The same with affinities below `least` taken as 0.
     #[must_use]
-    pub fn truncated(mut self, least: f64) -> Self {
+    pub(super) fn truncated(mut self, least: f64) -> Self {
         self.truncation = least;
         self
     }
 
     /// Number of landmarks k.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         match &self.landmarks {
             Landmarks::Planar(l) => l.a.len(),
             Landmarks::General(l) => l.a.len(),
         }
-    }
-
-    /// Whether there are no landmarks.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Writes the parameters (x, a) of greatest likelihood for a point of which `scratch.observed` holds the evidence; a
@@ -458,7 +453,7 @@ impl LandmarkModel {
     ///
     /// # Errors
     /// Cancelled.
-    pub fn place_points(
+    pub(super) fn place_points(
         &self,
         count: usize,
         evidence: Evidence,
@@ -488,7 +483,7 @@ impl LandmarkModel {
     ///
     /// # Panics
     /// If the distances are not from as many landmarks as the model has.
-    pub fn place_all(&self, distances: &LandmarkDistances, progress: &Progress) -> Result<Vec<f64>, Cancelled> {
+    pub(super) fn place_all(&self, distances: &LandmarkDistances, progress: &Progress) -> Result<Vec<f64>, Cancelled> {
         assert_eq!(distances.len(), self.len(), "the distances are those of the model's landmarks");
         let observe = |v: usize, row: &mut [f64]| {
             for (l, d) in row.iter_mut().enumerate() {

@@ -39,7 +39,7 @@ pub(super) fn logistic_pair(s: f64) -> (f64, f64) {
 }
 
 /// The model's affinity q for log-odds t.
-#[inline]
+#[cfg(test)]
 pub(super) fn logistic(t: f64) -> f64 {
     let (large, small) = logistic_pair(t.abs());
     if t < 0.0 { small } else { large }

@@ -1,21 +1,14 @@
-//! Embedding: a position in the plane for every vertex of a chart, from geodesic distances.
+//! Bernoulli logistic embedding, the paper's sections 3 and 4: coordinates in few dimensions for points of any kind, from the
+//! points themselves, from their distances or from affinities.
+//!
+//! [`embed()`] fits the model to all pairs of points, or to landmarks among which it then places the others. [`place`] and
+//! [`Embedding::transform`] place further points. [`unwrap`](crate::unwrap()) embeds each chart by the same model from the
+//! geodesic distances of its landmarks.
 //!
 //! # Terms
 //! **Affinity** p_ij: how strongly two points belong together, from their distance through a
-//! **kernel** of **width** σ. **Landmarks**: the k vertices the distances are measured from. **Gauge**: what
+//! **kernel** of **width** σ. **Landmarks**: the k points the distances are measured from. **Gauge**: what
 //! distances leave open (side, direction, place, and for the printed model scale).
-//!
-//! # Stage
-//! 1. Pieces that need no embedding: [`plane`], [`unfold()`].
-//! 2. [`embed_chart`]: σ from all distances; the landmarks by Bernoulli logistic embedding
-//!    ([`fit`]) from classical scaling or a seeded random start; every other vertex by logistic
-//!    regression on the landmarks ([`LandmarkModel`]). Isomap instead, for comparison.
-//! 3. [`fix_gauge`]: side, axes, scale.
-//!
-//! The result may have flips (few with the default model, many with the printed one); removing
-//! them is the next stage's.
-//!
-//! The same method for points, distances or affinities of any kind in any dimension: [`embed()`].
 //!
 //! # References
 //! Bernoulli embedding model and its application in texture mapping, 2006 ("the paper"), sections
@@ -42,18 +35,19 @@ mod square_matrix;
 mod truncated;
 mod unfold;
 
-pub use affinity::{Affinity, Kernel, KernelWidth, kernel_width, model_affinity};
-pub use bernoulli_logistic::{Fit, FitOptions, LogitModel, Update, fit};
-pub use chart::{ChartEmbedding, embed_chart};
+pub use affinity::KernelWidth;
+pub use bernoulli_logistic::Update;
 pub use embed::{EmbedOptions, embed};
 pub use embedded::Embedding;
 pub use error::EmbeddingError;
-pub use gauge::fix_gauge;
 pub use input::{EmbedInput, PointMetric};
-pub use landmark_regression::{Evidence, LandmarkModel};
+pub use landmark_regression::Evidence;
 pub use placement::{FittedLandmarks, place};
 pub use settings::{EmbeddingSettings, Initial, Model};
-pub use unfold::{plane, project, unfold};
+
+pub(crate) use chart::{ChartEmbedding, embed_chart};
+pub(crate) use gauge::fix_gauge;
+pub(crate) use unfold::{plane, project, unfold};
 
 #[cfg(test)]
 mod embed_tests;

@@ -15,6 +15,7 @@ const PRINTED_MEAN_AFFINITY: f64 = 0.57;
 
 /// How distances become positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Model {
     /// Bernoulli logistic embedding with intercepts and the logistic kernel: exact on developable charts.
     Default,
@@ -42,6 +43,7 @@ impl Model {
 
 /// Where the fit starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Initial {
     /// Classical scaling.
     Mds,
@@ -54,7 +56,7 @@ choices!(Initial {
     Random: "random", "Random", "Normally distributed points, drawn from the seed.";
 });
 
-/// Parameters of [`embed_chart`](super::embed_chart) and [`embed`](super::embed()).
+/// Parameters of the model and of its fit, for [`embed`](super::embed()) and for the embedding of charts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmbeddingSettings {
     /// The model.

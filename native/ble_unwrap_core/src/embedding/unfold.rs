@@ -23,7 +23,7 @@ const LARGEST_STRAIN: f64 = 5e-3;
 /// units of the surface, with the centroid of the vertices at the origin. Not guaranteed: flatter faces may come
 /// out without area or flipped, and a mesh that overlaps itself in its plane still does. O(n).
 #[must_use]
-pub fn plane(mesh: &TriMesh) -> Option<Vec<Point2<f64>>> {
+pub(crate) fn plane(mesh: &TriMesh) -> Option<Vec<Point2<f64>>> {
     let normals: Vec<Vector3<f64>> = mesh.faces().map(|f| area_vector(mesh.triangle_positions(f))).collect();
     let mean = normals.iter().sum::<Vector3<f64>>().try_normalize(0.0)?;
     for (f, normal) in mesh.faces().zip(&normals) {
@@ -41,7 +41,7 @@ pub fn plane(mesh: &TriMesh) -> Option<Vec<Point2<f64>>> {
 /// The orthogonal projection of a mesh along its mean normal, one position a vertex; `None` if a face leans by more than
 /// so many degrees from it. Not guaranteed: freedom from overlap. O(n).
 #[must_use]
-pub fn project(mesh: &TriMesh, most_degrees: f64) -> Option<Vec<Point2<f64>>> {
+pub(crate) fn project(mesh: &TriMesh, most_degrees: f64) -> Option<Vec<Point2<f64>>> {
     let normals = || mesh.faces().map(|f| area_vector(mesh.triangle_positions(f)));
     let mean = normals().sum::<Vector3<f64>>().try_normalize(0.0)?;
     let least = most_degrees.to_radians().cos();
@@ -74,7 +74,7 @@ fn onto_plane(mesh: &TriMesh, normal: &Vector3<f64>) -> Option<Vec<Point2<f64>>>
 /// # Panics
 /// If `rest` does not hold a triangle a face.
 #[must_use]
-pub fn unfold(mesh: &TriMesh, rest: &[RestTriangle]) -> Option<Vec<Point2<f64>>> {
+pub(crate) fn unfold(mesh: &TriMesh, rest: &[RestTriangle]) -> Option<Vec<Point2<f64>>> {
     assert_eq!(rest.len(), mesh.face_count(), "one rest triangle a face");
     if rest.is_empty() || (mesh.face_count() > 2 && !is_developable(mesh)) {
         return None;

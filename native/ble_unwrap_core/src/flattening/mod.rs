@@ -5,5 +5,5 @@
 mod rungs;
 mod steps;
 
-pub use rungs::{Rung, Rungs};
+pub(crate) use rungs::{Rung, Rungs};
 pub(crate) use steps::Steps;

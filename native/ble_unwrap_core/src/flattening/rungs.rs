@@ -2,7 +2,7 @@
 
 /// How a chart, or the decision to split it, came about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Rung {
+pub(crate) enum Rung {
     /// Coplanar faces, projected.
     Plane,
     /// A developable piece, unfolded isometrically.
@@ -68,7 +68,7 @@ impl Rung {
 
     /// A short name for reports.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Plane => "plane",
             Self::Unfold => "unfold",
@@ -95,16 +95,16 @@ impl Rung {
 
 /// Counts of rungs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Rungs([usize; Rung::ALL.len()]);
+pub(crate) struct Rungs([usize; Rung::ALL.len()]);
 
 impl Rungs {
     /// Counts one more.
-    pub fn take(&mut self, rung: Rung) {
+    pub(crate) fn take(&mut self, rung: Rung) {
         self.0[rung as usize] += 1;
     }
 
     /// Adds the counts of another.
-    pub fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         for (a, b) in self.0.iter_mut().zip(other.0) {
             *a += b;
         }
@@ -112,7 +112,7 @@ impl Rungs {
 
     /// Names and counts of the rungs taken at least once, in the order of the ladder.
     #[must_use]
-    pub fn taken(&self) -> Vec<(&'static str, usize)> {
+    pub(crate) fn taken(&self) -> Vec<(&'static str, usize)> {
         Rung::ALL.iter().map(|&r| (r.name(), self.0[r as usize])).filter(|&(_, n)| n > 0).collect()
     }
 }

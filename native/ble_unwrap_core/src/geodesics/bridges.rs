@@ -27,7 +27,7 @@ const MAX_ROUNDS: usize = 33;
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
-pub fn shortest_bridges(
+pub(crate) fn shortest_bridges(
     graph: &WeightedGraph,
     points: &[f64],
     dimension: usize,

@@ -16,6 +16,7 @@ const NAMED: usize = 5;
 
 /// A piece of a graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Piece {
     /// Number of points.
     pub size: usize,
@@ -26,6 +27,7 @@ pub struct Piece {
 /// How a point cloud hangs together by the edges to nearest neighbours. As a text it names the pieces and says what
 /// connects them.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Connectivity {
     /// Neighbours of each point.
     pub neighbours: usize,
@@ -87,7 +89,7 @@ impl fmt::Display for Connectivity {
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
-pub fn connectivity(
+pub(crate) fn connectivity(
     graph: &WeightedGraph,
     points: &[f64],
     dimension: usize,
@@ -122,7 +124,7 @@ pub fn connectivity(
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
-pub fn least_neighbours(
+pub(crate) fn least_neighbours(
     points: &[f64],
     dimension: usize,
     most: usize,

@@ -11,7 +11,7 @@ const CHECK_EVERY: usize = 4096;
 
 /// The arrays one search works in; make one a thread and use it for many sources.
 #[derive(Clone, Debug, Default)]
-pub struct DijkstraScratch {
+pub(crate) struct DijkstraScratch {
     /// Infinite but for the nodes in `reached`.
     distance: Vec<f64>,
     reached: Vec<u32>,
@@ -22,7 +22,7 @@ impl DijkstraScratch {
     /// The nodes that the last search reached, by distance; of equally far ones first that of lower index,
     /// unless edges without length lead to it. None after a search that was cancelled.
     #[must_use]
-    pub fn reached(&self) -> &[u32] {
+    pub(crate) fn reached(&self) -> &[u32] {
         &self.reached
     }
 
@@ -46,7 +46,7 @@ impl DijkstraScratch {
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
-pub fn dijkstra<'s>(
+pub(crate) fn dijkstra<'s>(
     graph: &WeightedGraph,
     sources: &[(usize, f64)],
     scratch: &'s mut DijkstraScratch,
@@ -63,7 +63,7 @@ pub fn dijkstra<'s>(
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
-pub fn dijkstra_within<'s>(
+pub(crate) fn dijkstra_within<'s>(
     graph: &WeightedGraph,
     sources: &[(usize, f64)],
     radius: f64,
@@ -137,7 +137,11 @@ fn offer(distance: &mut [f64], heap: &mut MinHeap, v: usize, d: f64, radius: f64
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
-pub fn graph_distances(graph: &WeightedGraph, sources: &[usize], progress: &Progress) -> Result<Vec<f64>, Cancelled> {
+pub(crate) fn graph_distances(
+    graph: &WeightedGraph,
+    sources: &[usize],
+    progress: &Progress,
+) -> Result<Vec<f64>, Cancelled> {
     graph_distances_within(graph, sources, f64::INFINITY, progress)
 }
 
@@ -146,7 +150,7 @@ pub fn graph_distances(graph: &WeightedGraph, sources: &[usize], progress: &Prog
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
-pub fn graph_distances_within(
+pub(crate) fn graph_distances_within(
     graph: &WeightedGraph,
     sources: &[usize],
     radius: f64,

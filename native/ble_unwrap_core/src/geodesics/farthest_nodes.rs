@@ -14,7 +14,7 @@ use crate::progress::{Cancelled, Progress};
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
-pub fn farthest_nodes(
+pub(crate) fn farthest_nodes(
     graph: &WeightedGraph,
     count: usize,
     first: usize,

@@ -92,7 +92,7 @@ type Placed = (VertexId, Point2<f64>);
 ///
 /// Some 240 bytes a face. Building is O(n).
 #[derive(Debug)]
-pub struct FastMarching<'m> {
+pub(crate) struct FastMarching<'m> {
     mesh: &'m TriMesh,
     spokes: Rows<Spoke>,
     wedges: Rows<Wedge>,
@@ -100,7 +100,7 @@ pub struct FastMarching<'m> {
 
 /// The arrays one march works in; make one a thread and use it for many sources.
 #[derive(Clone, Debug, Default)]
-pub struct MarchScratch {
+pub(crate) struct MarchScratch {
     distance: Vec<f64>,
     /// Twice the times a vertex was taken up again, plus one while it is accepted.
     state: Vec<u8>,
@@ -111,7 +111,7 @@ impl<'m> FastMarching<'m> {
     /// Measures and unfolds the triangles of a mesh: one or several components, with or without
     /// boundary, of any shape. Triangles without area pass the front along their edges.
     #[must_use]
-    pub fn new(mesh: &'m TriMesh) -> Self {
+    pub(crate) fn new(mesh: &'m TriMesh) -> Self {
         let n = mesh.vertex_count();
         let mut spokes = Vec::with_capacity(mesh.halfedge_count() * 2);
         let mut wedges = Vec::with_capacity(mesh.halfedge_count() * 2);
@@ -149,7 +149,7 @@ impl<'m> FastMarching<'m> {
     ///
     /// # Errors
     /// [`Cancelled`] if `progress` says so.
-    pub fn march<'s>(
+    pub(crate) fn march<'s>(
         &self,
         sources: &[(VertexId, f64)],
         scratch: &'s mut MarchScratch,

@@ -24,7 +24,12 @@ const CHUNK: usize = 256;
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
-pub fn knn_graph(points: &[f64], dimension: usize, k: usize, progress: &Progress) -> Result<WeightedGraph, Cancelled> {
+pub(crate) fn knn_graph(
+    points: &[f64],
+    dimension: usize,
+    k: usize,
+    progress: &Progress,
+) -> Result<WeightedGraph, Cancelled> {
     let places = Places::of(points, dimension);
     let tree = KdTree::new(points, dimension, places.first.clone());
     let edges = search_each(tree.order(), progress, |i, found, edges: &mut Vec<(usize, usize, f64)>| {

@@ -7,7 +7,7 @@ use crate::mesh::VertexId;
 /// Kept in single precision: half the memory of the largest array of the pipeline, and its relative
 /// error of 6e-8 lies far below the discretisation error of any geodesic.
 #[derive(Clone, Debug)]
-pub struct LandmarkDistances {
+pub(crate) struct LandmarkDistances {
     landmarks: Vec<VertexId>,
     vertex_count: usize,
     rows: Vec<f32>,
@@ -19,45 +19,39 @@ impl LandmarkDistances {
     /// # Panics
     /// If `rows` does not hold `landmarks.len() · vertex_count` values.
     #[must_use]
-    pub fn new(landmarks: Vec<VertexId>, vertex_count: usize, rows: Vec<f32>) -> Self {
+    pub(crate) fn new(landmarks: Vec<VertexId>, vertex_count: usize, rows: Vec<f32>) -> Self {
         assert_eq!(rows.len(), landmarks.len() * vertex_count, "one row of distances a landmark");
         Self { landmarks, vertex_count, rows }
     }
 
     /// The landmarks, in order of importance.
     #[must_use]
-    pub fn landmarks(&self) -> &[VertexId] {
+    pub(crate) fn landmarks(&self) -> &[VertexId] {
         &self.landmarks
     }
 
     /// Number of landmarks k.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.landmarks.len()
-    }
-
-    /// Whether there are no landmarks.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.landmarks.is_empty()
     }
 
     /// Number of vertices n.
     #[must_use]
-    pub fn vertex_count(&self) -> usize {
+    pub(crate) fn vertex_count(&self) -> usize {
         self.vertex_count
     }
 
     /// Distances from landmark number `l` to every vertex.
     #[must_use]
-    pub fn row(&self, l: usize) -> &[f32] {
+    pub(crate) fn row(&self, l: usize) -> &[f32] {
         &self.rows[l * self.vertex_count..(l + 1) * self.vertex_count]
     }
 
     /// The distances of a part, whose vertex `i` is this mesh's `vertices[i]`, from the landmarks that lie in it. Not
     /// guaranteed: that the shortest paths stay in the part; so they are at most what the part alone would have. O(kn).
     #[must_use]
-    pub fn restricted(&self, vertices: &[VertexId]) -> Self {
+    pub(crate) fn restricted(&self, vertices: &[VertexId]) -> Self {
         let mut place = vec![VertexId::NONE; self.vertex_count];
         for (i, v) in vertices.iter().enumerate().rev() {
             place[v.index()] = VertexId::new(i);
@@ -69,22 +63,23 @@ impl LandmarkDistances {
     }
 
     /// All distances, row after row.
+    #[cfg(test)]
     #[must_use]
-    pub fn into_rows(self) -> Vec<f32> {
+    pub(crate) fn into_rows(self) -> Vec<f32> {
         self.rows
     }
 
     /// Distance from landmark number `l` to `v`.
     #[inline]
     #[must_use]
-    pub fn get(&self, l: usize, v: VertexId) -> f64 {
+    pub(crate) fn get(&self, l: usize, v: VertexId) -> f64 {
         f64::from(self.rows[l * self.vertex_count + v.index()])
     }
 
     /// The k×k distances between landmarks, row by row, made symmetric by averaging: marching from
     /// one end and from the other differs by the discretisation error.
     #[must_use]
-    pub fn between_landmarks(&self) -> Vec<f64> {
+    pub(crate) fn between_landmarks(&self) -> Vec<f64> {
         let k = self.len();
         let mut d = vec![0.0; k * k];
         for i in 0..k {

@@ -13,23 +13,17 @@ use crate::memory;
 use crate::mesh::{TriMesh, VertexId, measure};
 use crate::progress::{Cancelled, Progress};
 
-/// Chooses at most `count` landmarks, all different: the first half from `importance` if it is given
-/// (most important first), the rest each as far from all before it as any vertex.
+/// Chooses at most `count` landmarks, all different, each as far from all before it as any vertex.
 ///
 /// Farthest is measured along edges, which costs one bounded search a landmark, O(n log n log k)
-/// together, where marching would cost k whole marches; the choice hardly differs. Without
-/// `importance` the first landmark is the vertex farthest from the middle of the surface. A component
+/// together, where marching would cost k whole marches; the choice hardly differs. The
+/// first landmark is the vertex farthest from the middle of the surface. A component
 /// without landmark is farther than anything else, so each gets one while they last. Ties go to the
 /// lower index. Fewer than `count` are returned if the rest coincides with those chosen.
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
-pub fn choose_landmarks(
-    mesh: &TriMesh,
-    count: usize,
-    importance: Option<&[VertexId]>,
-    progress: &Progress,
-) -> Result<Vec<VertexId>, Cancelled> {
+pub(crate) fn choose_landmarks(mesh: &TriMesh, count: usize, progress: &Progress) -> Result<Vec<VertexId>, Cancelled> {
     let n = mesh.vertex_count();
     let count = count.min(n);
     let graph = WeightedGraph::of_mesh(mesh);
@@ -40,15 +34,7 @@ pub fn choose_landmarks(
         landmarks.push(v);
         add_source(&graph, v.index(), cover, &mut heap, progress)
     };
-    for &v in importance.unwrap_or_default() {
-        if landmarks.len() >= count.div_ceil(2) {
-            break;
-        }
-        if v.index() < n && cover[v.index()] > 0.0 {
-            take(v, &mut cover, &mut landmarks)?;
-        }
-    }
-    if landmarks.is_empty() && count > 0 {
+    if count > 0 {
         let middle = middle_vertex(mesh);
         let mut scratch = DijkstraScratch::default();
         let from_middle = dijkstra(&graph, &[(middle.index(), 0.0)], &mut scratch, progress)?;
@@ -104,7 +90,7 @@ fn middle_vertex(mesh: &TriMesh) -> VertexId {
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so, or there is no memory for the rows.
-pub fn geodesic_distances(
+pub(crate) fn geodesic_distances(
     mesh: &TriMesh,
     sources: &[VertexId],
     metric: Metric,
@@ -143,17 +129,16 @@ pub fn geodesic_distances(
     Ok(LandmarkDistances::new(sources.to_vec(), n, rows))
 }
 
-/// Landmarks of a mesh by farthest-point sampling, and the distances from them. For landmarks by
-/// importance, pass those of [`choose_landmarks`] to [`geodesic_distances`].
+/// Landmarks of a mesh by farthest-point sampling, and the distances from them.
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
-pub fn landmark_distances(
+pub(crate) fn landmark_distances(
     mesh: &TriMesh,
     settings: &GeodesicSettings,
     progress: &Progress,
 ) -> Result<LandmarkDistances, Cancelled> {
-    let landmarks = choose_landmarks(mesh, settings.landmark_count(mesh.vertex_count()), None, progress)?;
+    let landmarks = choose_landmarks(mesh, settings.landmark_count(mesh.vertex_count()), progress)?;
     geodesic_distances(mesh, &landmarks, settings.metric, progress)
 }
 
@@ -169,7 +154,7 @@ mod tests {
     #[test]
     fn landmarks_are_far_apart_and_cover() {
         let mesh = grid(30, 30, [1.0, 1.0], 0.0);
-        let landmarks = choose_landmarks(&mesh, 40, None, &Progress::new()).expect("not cancelled");
+        let landmarks = choose_landmarks(&mesh, 40, &Progress::new()).expect("not cancelled");
         assert_eq!(landmarks.len(), 40);
         let distance = |a: VertexId, b: VertexId| (mesh.position(a) - mesh.position(b)).norm();
         let nearest =
@@ -184,19 +169,6 @@ mod tests {
     }
 
     #[test]
-    fn importance_gives_the_first_half() {
-        let mesh = sphere(2);
-        let order: Vec<_> = [5, 5, 99_999, 17, 3, 8, 9, 2].map(VertexId::new).to_vec();
-        let landmarks = choose_landmarks(&mesh, 6, Some(&order), &Progress::new()).expect("not cancelled");
-        assert_eq!(landmarks.len(), 6);
-        assert_eq!(landmarks[..3], [5, 17, 3].map(VertexId::new));
-        let mut distinct = landmarks.clone();
-        distinct.sort_unstable();
-        distinct.dedup();
-        assert_eq!(distinct.len(), 6);
-    }
-
-    #[test]
     fn every_component_gets_a_landmark_and_coincident_vertices_none() {
         let a = sphere(1);
         let mut positions = a.positions().to_vec();
@@ -207,11 +179,11 @@ mod tests {
         triangles.extend(triangles.clone().iter().map(|t| t.map(|v| v + n)));
         triangles.push([2 * n, 2 * n + 1, 2 * n + 2]);
         let mesh = test_surfaces::mesh(&positions, &triangles);
-        let landmarks = choose_landmarks(&mesh, 3, None, &Progress::new()).expect("not cancelled");
+        let landmarks = choose_landmarks(&mesh, 3, &Progress::new()).expect("not cancelled");
         let mut part: Vec<_> = landmarks.iter().map(|l| l.index() as u32 / n).collect();
         part.sort_unstable();
         assert_eq!(part, [0, 1, 2]);
-        let all = choose_landmarks(&mesh, 1000, None, &Progress::new()).expect("not cancelled");
+        let all = choose_landmarks(&mesh, 1000, &Progress::new()).expect("not cancelled");
         assert_eq!(all.len(), 2 * n as usize + 1);
     }
 
@@ -245,7 +217,7 @@ mod tests {
         let empty = geodesic_distances(&TriMesh::default(), &sources, Metric::FastMarching, &Progress::new());
         assert_eq!(empty.expect("not cancelled").vertex_count(), 0);
         let none = landmark_distances(&TriMesh::default(), &GeodesicSettings::default(), &Progress::new());
-        assert!(none.expect("not cancelled").is_empty());
+        assert_eq!(none.expect("not cancelled").len(), 0);
         let cancelled = Progress::new();
         cancelled.cancel();
         assert!(geodesic_distances(&mesh, &sources, Metric::FastMarching, &cancelled).is_err());

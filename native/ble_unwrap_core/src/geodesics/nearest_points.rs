@@ -13,7 +13,7 @@ use crate::progress::{Cancelled, Progress};
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
-pub fn nearest_points(
+pub(crate) fn nearest_points(
     points: &[f64],
     queries: &[f64],
     dimension: usize,

@@ -4,8 +4,11 @@ use crate::choice::choices;
 
 /// How distances along a surface are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Metric {
-    /// Fast marching across triangles ([`FastMarching`](super::FastMarching)).
+    /// Fast marching across triangles. On curved surfaces its error is of first order in the edge length: 0.1 to 0.4 % on
+    /// average and up to 3 % at single vertices of meshes of some thousand; none to speak of where the surface unrolls and
+    /// the straight path meets no boundary.
     FastMarching,
     /// Shortest paths along edges: an upper bound, some 5 to 9 % too long on average where triangles are well shaped, and
     /// without limit where they are not. For comparison.

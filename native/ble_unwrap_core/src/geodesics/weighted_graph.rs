@@ -5,7 +5,7 @@ use crate::mesh::TriMesh;
 /// An undirected graph with a length for each edge: the neighbours of node v and the lengths to them
 /// are two parallel slices.
 #[derive(Clone, Debug, PartialEq)]
-pub struct WeightedGraph {
+pub(crate) struct WeightedGraph {
     offsets: Vec<usize>,
     targets: Vec<u32>,
     lengths: Vec<f64>,
@@ -16,7 +16,7 @@ impl WeightedGraph {
     /// several edges between the same nodes the shortest is kept. Left out: loops, edges to nodes that
     /// are not there, lengths that are negative or no number. O(n + m log d), where d is the most edges of a node.
     #[must_use]
-    pub fn from_edges(n: usize, edges: impl IntoIterator<Item = (usize, usize, f64)>) -> Self {
+    pub(crate) fn from_edges(n: usize, edges: impl IntoIterator<Item = (usize, usize, f64)>) -> Self {
         let mut edges: Vec<(u32, u32, f64)> = edges
             .into_iter()
             .filter(|&(u, v, length)| u < n && v < n && u != v && length >= 0.0)
@@ -54,7 +54,7 @@ impl WeightedGraph {
 
     /// The vertices and edges of a mesh.
     #[must_use]
-    pub fn of_mesh(mesh: &TriMesh) -> Self {
+    pub(crate) fn of_mesh(mesh: &TriMesh) -> Self {
         let edges = mesh.edges().map(|h| (mesh.from(h).index(), mesh.to(h).index(), mesh.edge_length(h)));
         Self::from_edges(mesh.vertex_count(), edges)
     }
@@ -62,7 +62,7 @@ impl WeightedGraph {
     /// The graph with more edges, such as the bridges of [`shortest_bridges`](super::shortest_bridges()); which of
     /// them are taken says [`WeightedGraph::from_edges`].
     #[must_use]
-    pub fn with_edges(&self, edges: &[(usize, usize, f64)]) -> Self {
+    pub(crate) fn with_edges(&self, edges: &[(usize, usize, f64)]) -> Self {
         let n = self.node_count();
         let present = (0..n).flat_map(|u| self.neighbours(u).filter(move |&(v, _)| u < v).map(move |(v, l)| (u, v, l)));
         Self::from_edges(n, present.chain(edges.iter().copied()))
@@ -70,19 +70,20 @@ impl WeightedGraph {
 
     /// Number of nodes.
     #[must_use]
-    pub fn node_count(&self) -> usize {
+    pub(crate) fn node_count(&self) -> usize {
         self.offsets.len() - 1
     }
 
     /// Number of edges.
+    #[cfg(test)]
     #[must_use]
-    pub fn edge_count(&self) -> usize {
+    pub(crate) fn edge_count(&self) -> usize {
         self.targets.len() / 2
     }
 
     /// The neighbours of a node, ascending, with the lengths to them.
     #[inline]
-    pub fn neighbours(&self, node: usize) -> impl ExactSizeIterator<Item = (usize, f64)> + '_ {
+    pub(crate) fn neighbours(&self, node: usize) -> impl ExactSizeIterator<Item = (usize, f64)> + '_ {
         let row = self.offsets[node]..self.offsets[node + 1];
         self.targets[row.clone()].iter().map(|&t| t as usize).zip(self.lengths[row].iter().copied())
     }
@@ -91,7 +92,7 @@ impl WeightedGraph {
     /// node. Distances between components are infinite; [`connectivity()`](super::connectivity()) tells how to mend the
     /// graph of a point cloud.
     #[must_use]
-    pub fn components(&self) -> (Vec<u32>, usize) {
+    pub(crate) fn components(&self) -> (Vec<u32>, usize) {
         let mut label = vec![u32::MAX; self.node_count()];
         let mut count = 0;
         let mut stack = Vec::new();

@@ -17,7 +17,7 @@ const LEAST_EIGENVALUE: f64 = 1e-12;
 
 /// Classical scaling of k points: coordinates along the principal axes and the spectrum.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Mds {
+pub(crate) struct Mds {
     /// The eigenvalues of B = −½JD²J, largest first: all k, of which negative ones tell how far from
     /// Euclidean the distances are; from [`leading_mds`] only those asked for. Units of squared distance.
     pub eigenvalues: Vec<f64>,
@@ -38,7 +38,7 @@ impl Mds {
     /// # Panics
     /// If there are not k·m coordinates.
     #[must_use]
-    pub fn from_parts(coordinates: Vec<f64>, dimensions: usize, mean_squared: Vec<f64>) -> Self {
+    pub(crate) fn from_parts(coordinates: Vec<f64>, dimensions: usize, mean_squared: Vec<f64>) -> Self {
         assert_eq!(coordinates.len(), dimensions * mean_squared.len(), "m coordinates a point");
         let mut eigenvalues = vec![0.0; dimensions];
         for row in coordinates.chunks_exact(dimensions.max(1)) {
@@ -49,26 +49,20 @@ impl Mds {
 
     /// Number of points k.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.mean_squared.len()
-    }
-
-    /// Whether there are no points.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.mean_squared.is_empty()
     }
 
     /// The m coordinates of point `i`.
     #[must_use]
-    pub fn point(&self, i: usize) -> &[f64] {
+    pub(crate) fn point(&self, i: usize) -> &[f64] {
         &self.coordinates[i * self.dimensions..(i + 1) * self.dimensions]
     }
 
     /// Share of the first `count` eigenvalues in the sum of the positive ones held, from 0 to 1; 1 where
     /// none is positive. With all eigenvalues and `count` 2 it tells how well the points fit in a plane.
     #[must_use]
-    pub fn energy_share(&self, count: usize) -> f64 {
+    pub(crate) fn energy_share(&self, count: usize) -> f64 {
         let positive = |values: &[f64]| values.iter().filter(|v| **v > 0.0).sum::<f64>();
         let total = positive(&self.eigenvalues);
         if total > 0.0 { positive(&self.eigenvalues[..count.min(self.eigenvalues.len())]) / total } else { 1.0 }
@@ -80,7 +74,7 @@ impl Mds {
     ///
     /// # Panics
     /// If `squared` does not hold k values.
-    pub fn place(&self, squared: &[f64], place: &mut [f64]) {
+    pub(crate) fn place(&self, squared: &[f64], place: &mut [f64]) {
         assert_eq!(squared.len(), self.len(), "one squared distance a point");
         place.fill(0.0);
         let kept = self.dimensions.min(place.len());
@@ -107,7 +101,7 @@ impl Mds {
 ///
 /// # Panics
 /// If `squared` does not hold k² values.
-pub fn classical_mds(squared: &[f64], k: usize, keep: usize) -> Result<Mds, EigenError> {
+pub(crate) fn classical_mds(squared: &[f64], k: usize, keep: usize) -> Result<Mds, EigenError> {
     assert_eq!(squared.len(), k * k, "a square matrix, row by row");
     if k == 0 {
         return Ok(Mds::default());
@@ -148,7 +142,7 @@ fn from_pairs(pairs: Eigenpairs, kept: usize, mean_squared: Vec<f64>) -> Mds {
 ///
 /// # Panics
 /// If `squared` does not hold k² values.
-pub fn leading_mds(
+pub(crate) fn leading_mds(
     squared: &[f64],
     k: usize,
     keep: usize,
@@ -283,7 +277,7 @@ mod tests {
         let line: Vec<[f64; 2]> = (0..6).map(|i| [f64::from(i), 2.0 * f64::from(i)]).collect();
         assert_eq!(classical_mds(&squared(&line), 6, 2).expect("finite").dimensions, 1);
         assert_eq!(classical_mds(&[0.0; 9], 3, 2).expect("finite").dimensions, 0);
-        assert!(classical_mds(&[], 0, 2).expect("nothing").is_empty());
+        assert_eq!(classical_mds(&[], 0, 2).expect("nothing").len(), 0);
     }
 
     #[test]

@@ -11,9 +11,8 @@ mod sparse_pattern;
 mod symmetric;
 mod vector_state;
 
-pub use classical_mds::{Mds, classical_mds, leading_mds};
-pub use packing_buffers::bytes_of_packing_buffers;
-pub use sparse::{RoughCholesky, SparseCholesky, SparseError};
-pub use sparse_pattern::SparsePattern;
-pub use symmetric::{EigenError, Eigenpairs, leading_eigenpairs};
-pub use vector_state::restore_vector_state;
+pub(crate) use classical_mds::{Mds, classical_mds, leading_mds};
+pub(crate) use packing_buffers::bytes_of_packing_buffers;
+pub(crate) use sparse::{RoughCholesky, SparseCholesky, SparseError};
+pub(crate) use sparse_pattern::SparsePattern;
+pub(crate) use symmetric::EigenError;

@@ -62,7 +62,7 @@ pub(super) fn reserve() -> Result<(), OutOfMemory> {
 }
 
 /// Address space that so many threads will take for buffers they do not have yet, in bytes.
-pub fn bytes_of_packing_buffers(threads: usize) -> u64 {
+pub(crate) fn bytes_of_packing_buffers(threads: usize) -> u64 {
     let missing = threads.saturating_sub(READY.load(Ordering::Relaxed));
     (missing as u64).saturating_mul(bytes_a_thread() + SLACK)
 }
@@ -119,7 +119,7 @@ mod tests {
         let n = 700;
         let matrix: Vec<f64> = (0..n * n).map(|i| if i % (n + 1) == 0 { 2.0 } else { 1.0 / n as f64 }).collect();
         let before = size();
-        let pairs = crate::linalg::leading_eigenpairs(&matrix, n, 2).expect("finite");
+        let pairs = crate::linalg::symmetric::leading_eigenpairs(&matrix, n, 2).expect("finite");
         assert_eq!(pairs.values.len(), n);
         assert!(size() - before < 64 << 20, "{} more", size() - before);
     }

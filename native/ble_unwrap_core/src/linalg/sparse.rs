@@ -20,7 +20,7 @@ use crate::memory::{self, OutOfMemory};
 
 /// Why a sparse system could not be factored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum SparseError {
+pub(crate) enum SparseError {
     /// A pivot was not positive, or a value was not finite: the matrix is not numerically positive
     /// definite.
     #[error("the matrix is not positive definite (row {row})")]
@@ -51,7 +51,7 @@ const MOST_STEPS: usize = 24;
 ///
 /// Serial, hence the same bits whatever the number of threads; callers run charts in parallel. Once
 /// made, refactoring and solving allocate nothing.
-pub struct SparseCholesky {
+pub(crate) struct SparseCholesky {
     pattern: SparsePattern,
     factor: Factor<f64>,
     scratch: MemBuffer,
@@ -63,7 +63,7 @@ impl SparseCholesky {
     ///
     /// # Errors
     /// [`SparseError::TooLarge`], [`SparseError::OutOfMemory`].
-    pub fn analyse(pattern: SparsePattern) -> Result<Self, SparseError> {
+    pub(crate) fn analyse(pattern: SparsePattern) -> Result<Self, SparseError> {
         let factor = Factor::analyse(&pattern, Order::of(&pattern)?)?;
         let scratch = buffer(factor.refactor_scratch().or(factor.solve_scratch()))?;
         Ok(Self { pattern, factor, scratch })
@@ -71,7 +71,7 @@ impl SparseCholesky {
 
     /// The pattern that was analysed.
     #[must_use]
-    pub fn pattern(&self) -> &SparsePattern {
+    pub(crate) fn pattern(&self) -> &SparsePattern {
         &self.pattern
     }
 
@@ -82,7 +82,7 @@ impl SparseCholesky {
     ///
     /// # Panics
     /// If there is not one value for each entry of the pattern.
-    pub fn refactor(&mut self, values: &[f64]) -> Result<(), SparseError> {
+    pub(crate) fn refactor(&mut self, values: &[f64]) -> Result<(), SparseError> {
         assert_eq!(values.len(), self.pattern.entry_count(), "one value for each entry of the pattern");
         if let Some(bad) = values.iter().position(|v| !v.is_finite()) {
             return Err(SparseError::NotPositiveDefinite { row: self.pattern.row(bad) });
@@ -95,14 +95,14 @@ impl SparseCholesky {
     ///
     /// # Panics
     /// If the length of `columns` is not once or twice the size of the matrix.
-    pub fn solve_in_place(&mut self, columns: &mut [f64]) {
+    pub(crate) fn solve_in_place(&mut self, columns: &mut [f64]) {
         self.factor.solve_in_place(columns, MemStack::new(&mut self.scratch));
     }
 }
 
 /// Solves systems of 2×2 blocks, a block for each entry of a pattern, roughly: a factor in single precision, which takes
 /// half the memory, leads conjugate gradients in double precision to a small residual. Serial, like [`SparseCholesky`].
-pub struct RoughCholesky {
+pub(crate) struct RoughCholesky {
     pattern: SparsePattern,
     factor: Factor<f32>,
     /// For factoring: the matrix in single precision, and what the factorisation needs. For solving: the vectors of the
@@ -115,7 +115,7 @@ impl RoughCholesky {
     ///
     /// # Errors
     /// [`SparseError::TooLarge`], [`SparseError::OutOfMemory`].
-    pub fn analyse(blocks: SparsePattern) -> Result<Self, SparseError> {
+    pub(crate) fn analyse(blocks: SparsePattern) -> Result<Self, SparseError> {
         let (pattern, order) = (blocks.with_blocks_of_two(), Order::of(&blocks)?.with_blocks_of_two());
         drop(blocks);
         let factor = Factor::analyse(&pattern, order)?;
@@ -128,7 +128,7 @@ impl RoughCholesky {
 
     /// The pattern of all unknowns, two for each block.
     #[must_use]
-    pub fn pattern(&self) -> &SparsePattern {
+    pub(crate) fn pattern(&self) -> &SparsePattern {
         &self.pattern
     }
 
@@ -139,7 +139,7 @@ impl RoughCholesky {
     ///
     /// # Panics
     /// If there is not one value for each entry of the pattern.
-    pub fn refactor(&mut self, values: &[f64]) -> Result<(), SparseError> {
+    pub(crate) fn refactor(&mut self, values: &[f64]) -> Result<(), SparseError> {
         assert_eq!(values.len(), self.pattern.entry_count(), "one value for each entry of the pattern");
         let stack = MemStack::new(&mut self.scratch);
         let (mut rough, stack) = stack.make_with(values.len(), |at| values[at] as f32);
@@ -158,7 +158,7 @@ impl RoughCholesky {
     ///
     /// # Panics
     /// If there is not one value for each entry of the pattern, or the length of `x` is not its size.
-    pub fn solve_in_place(&mut self, values: &[f64], x: &mut [f64]) {
+    pub(crate) fn solve_in_place(&mut self, values: &[f64], x: &mut [f64]) {
         assert_eq!((values.len(), x.len()), (self.pattern.entry_count(), self.pattern.size()), "of the pattern");
         let n = x.len();
         let stack = MemStack::new(&mut self.scratch);

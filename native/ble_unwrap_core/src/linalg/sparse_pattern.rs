@@ -6,7 +6,7 @@ use faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
 ///
 /// Every diagonal entry is present; rows ascend within a column.
 #[derive(Clone)]
-pub struct SparsePattern {
+pub(crate) struct SparsePattern {
     entries: SymbolicSparseColMat<u32>,
 }
 
@@ -17,7 +17,7 @@ impl SparsePattern {
     /// # Panics
     /// If a pair names a row that is not there.
     #[must_use]
-    pub fn from_pairs(size: usize, pairs: impl IntoIterator<Item = (u32, u32)>) -> Self {
+    pub(crate) fn from_pairs(size: usize, pairs: impl IntoIterator<Item = (u32, u32)>) -> Self {
         let mut entries: Vec<(u32, u32)> = pairs.into_iter().map(|(i, j)| (i.max(j), i.min(j))).collect();
         entries.extend((0..size as u32).map(|i| (i, i)));
         entries.sort_unstable();
@@ -41,7 +41,7 @@ impl SparsePattern {
 
     /// Every entry replaced by a 2×2 block: unknown `i` becomes unknowns `2i` and `2i + 1`. O(m).
     #[must_use]
-    pub fn with_blocks_of_two(&self) -> Self {
+    pub(crate) fn with_blocks_of_two(&self) -> Self {
         let mut column_start = Vec::with_capacity(2 * self.size() + 1);
         let mut row = Vec::with_capacity(4 * self.entry_count());
         column_start.push(0);
@@ -58,25 +58,25 @@ impl SparsePattern {
 
     /// Number of rows and columns.
     #[must_use]
-    pub fn size(&self) -> usize {
+    pub(crate) fn size(&self) -> usize {
         self.starts().len() - 1
     }
 
     /// Number of stored entries: the length of the array of values that goes with the pattern.
     #[must_use]
-    pub fn entry_count(&self) -> usize {
+    pub(crate) fn entry_count(&self) -> usize {
         self.entries.row_idx().len()
     }
 
     /// The rows of column `j`, the diagonal last.
     #[must_use]
-    pub fn column(&self, j: usize) -> &[u32] {
+    pub(crate) fn column(&self, j: usize) -> &[u32] {
         &self.entries.row_idx()[self.start(j)..self.start(j + 1)]
     }
 
     /// Where the value of entry (i, j), equally (j, i), is kept, if it is in the pattern. O(log).
     #[must_use]
-    pub fn position(&self, i: usize, j: usize) -> Option<usize> {
+    pub(crate) fn position(&self, i: usize, j: usize) -> Option<usize> {
         let (row, column) = (i.min(j) as u32, i.max(j));
         let found = self.column(column).binary_search(&row).ok()?;
         Some(self.start(column) + found)
@@ -84,7 +84,7 @@ impl SparsePattern {
 
     /// Where the value of entry (j, j) is kept.
     #[must_use]
-    pub fn diagonal(&self, j: usize) -> usize {
+    pub(crate) fn diagonal(&self, j: usize) -> usize {
         self.start(j + 1) - 1
     }
 

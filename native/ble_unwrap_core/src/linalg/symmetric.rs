@@ -12,7 +12,7 @@ use crate::progress::Cancelled;
 
 /// Why a symmetric matrix has no eigenpairs to give.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum EigenError {
+pub(crate) enum EigenError {
     /// An entry is infinite or not a number.
     #[error("entry ({row}, {column}) of the matrix is not finite")]
     NotFinite {
@@ -37,7 +37,7 @@ impl From<OutOfMemory> for EigenError {
 
 /// The eigenvalues of a symmetric matrix and the eigenvectors of the largest.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Eigenpairs {
+pub(crate) struct Eigenpairs {
     /// All n eigenvalues, largest first.
     pub values: Vec<f64>,
     /// The m leading unit eigenvectors as an n×m matrix, row by row: column `j` belongs to
@@ -56,7 +56,7 @@ pub struct Eigenpairs {
 ///
 /// # Panics
 /// If `matrix` does not hold n² values.
-pub fn leading_eigenpairs(matrix: &[f64], n: usize, count: usize) -> Result<Eigenpairs, EigenError> {
+pub(crate) fn leading_eigenpairs(matrix: &[f64], n: usize, count: usize) -> Result<Eigenpairs, EigenError> {
     assert_eq!(matrix.len(), n * n, "a square matrix, row by row");
     for row in 0..n {
         if let Some(column) = matrix[row * n..=row * n + row].iter().position(|v| !v.is_finite()) {

@@ -10,7 +10,7 @@ use faer::MatRef;
 /// 100, a logarithm takes 147 ns instead of 4, and keeps doing so for the life of the thread. A function
 /// compiled for the wide registers clears the mark when it returns; faer's norm is one that can be called
 /// without `unsafe`. Results do not change; costs about 50 ns. Elsewhere than on x86 nothing happens.
-pub fn restore_vector_state() {
+pub(crate) fn restore_vector_state() {
     const SIDE: usize = 16;
     let ones = [1.0_f64; SIDE * SIDE];
     let norm = MatRef::from_row_major_slice(std::hint::black_box(&ones), SIDE, SIDE).norm_max();

@@ -1,8 +1,8 @@
 //! Memory: what is left of it, and how a refusal reaches the user as an error.
 //!
 //! What a call computes never depends on the memory that is free: it has its one result, or it ends with [`OutOfMemory`].
-//! Three nets lie under each other. A call estimates what it will need and [`require`]s it before it begins. Large arrays
-//! are asked for fallibly ([`reserve`]). And an allocator that had to fall back on its reserve says so by
+//! Three nets lie under each other. A call estimates what it will need and looks whether that is there before it begins. Large
+//! arrays are asked for in a way that can fail ([`required`], which hosts may use for arrays of their own). And an allocator that had to fall back on its reserve says so by
 //! [`note_refusal`], upon which every computation under way stops at its next look at [`Progress`](crate::Progress).
 
 mod container;
@@ -17,6 +17,7 @@ pub(crate) use last_cache::last_cache;
 
 /// The computation needs more memory than there is; nothing was produced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum OutOfMemory {
     /// Found before the work began.
     #[error(
@@ -57,7 +58,7 @@ pub(crate) fn text(bytes: u64) -> String {
 ///
 /// # Errors
 /// [`OutOfMemory::Foreseen`].
-pub fn require(needed: u64) -> Result<(), OutOfMemory> {
+pub(crate) fn require(needed: u64) -> Result<(), OutOfMemory> {
     match available() {
         Some(available) if available < needed => Err(OutOfMemory::Foreseen { needed, available }),
         _ => Ok(()),
@@ -78,7 +79,7 @@ pub fn required<T>(count: usize) -> Result<Vec<T>, OutOfMemory> {
 ///
 /// # Errors
 /// [`OutOfMemory::Refused`], also where the size overflows.
-pub fn reserve<T>(count: usize) -> Result<Vec<T>, OutOfMemory> {
+pub(crate) fn reserve<T>(count: usize) -> Result<Vec<T>, OutOfMemory> {
     let mut room = Vec::new();
     match room.try_reserve_exact(count) {
         Ok(()) => Ok(room),
@@ -87,7 +88,7 @@ pub fn reserve<T>(count: usize) -> Result<Vec<T>, OutOfMemory> {
 }
 
 /// A vector of so many equal elements; errors as for [`reserve`].
-pub fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>, OutOfMemory> {
+pub(crate) fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>, OutOfMemory> {
     let mut room = reserve(count)?;
     room.resize(count, value);
     Ok(room)
@@ -96,7 +97,7 @@ pub fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>, OutOfMemory> {
 /// Bytes left to this process: the least of what its own limits and those of its container leave and what the machine has to
 /// give, swap included. `None` where the platform does not tell. Read from `/proc` and the control groups on Linux; elsewhere the system's own refusal has to do.
 #[must_use]
-pub fn available() -> Option<u64> {
+pub(crate) fn available() -> Option<u64> {
     if !cfg!(target_os = "linux") {
         return None;
     }

@@ -23,16 +23,10 @@ const LEAST_AREA: f64 = 1e-12;
 
 /// Choices of [`condition`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ConditionOptions {
+pub(crate) struct ConditionOptions {
     /// Whether vertices at the same position are one.
     pub weld: bool,
-    /// How near to each other such vertices are, in the unit of the input: 0 for exactly the same coordinates. `None` for
-    /// what single precision cannot tell apart: 2⁻²¹ of the diagonal of the bounding box or, if all coordinates are numbers
-    /// of single precision, of the greatest of them where that is larger; at most a hundredth of the mean side. Nothing
-    /// without `weld`.
-    ///
-    /// A group of vertices lies within the distance around one of them, so chains are broken up. Two vertices of one polygon
-    /// are never welded unless they coincide: no polygon loses a side by it, however long the distance.
+    /// How near to each other such vertices are, as [`Settings::weld_distance`](crate::Settings::weld_distance) says.
     pub weld_distance: Option<f64>,
 }
 
@@ -51,7 +45,7 @@ impl Default for ConditionOptions {
 ///
 /// Not guaranteed: a boundary, being connected, positive areas, distinct positions.
 #[derive(Clone, Debug)]
-pub struct Surface {
+pub(crate) struct Surface {
     /// The mesh, centred on the middle of its box and scaled to unit area (see [`Surface::scale`]).
     pub mesh: Arc<TriMesh>,
     /// The input polygon of each triangle; ascending.
@@ -68,10 +62,6 @@ pub struct Surface {
     /// Each input polygon that is nothing but a segment or a point on the border of another, with that one; it has no
     /// triangles, and its corners follow the other's. Ascending.
     pub absorbed: Vec<[u32; 2]>,
-    /// Whether a half-edge runs inside a polygon; such edges are never cut.
-    pub diagonal: Vec<bool>,
-    /// Whether a triangle is wound against its polygon.
-    pub reversed: Vec<bool>,
     /// Polygons with a non-finite vertex, which have no triangles here; ascending.
     pub unmapped: Vec<u32>,
     /// What was found and mended.
@@ -92,8 +82,6 @@ impl Default for Surface {
             representative: Vec::new(),
             followers: Vec::new(),
             absorbed: Vec::new(),
-            diagonal: Vec::new(),
-            reversed: Vec::new(),
             unmapped: Vec::new(),
             defects: Defects::default(),
             scale: 1.0,
@@ -102,16 +90,10 @@ impl Default for Surface {
 }
 
 impl Surface {
-    /// Whether a half-edge runs inside a polygon.
-    #[must_use]
-    pub fn is_diagonal(&self, h: HalfedgeId) -> bool {
-        self.diagonal[h.index()]
-    }
-
     /// The vertex of the mesh that each input corner lies at, by corner, ascending; corners of unmapped polygons have none.
     /// O(n log n).
     #[must_use]
-    pub fn places(&self) -> Vec<(u32, VertexId)> {
+    pub(crate) fn places(&self) -> Vec<(u32, VertexId)> {
         let mut places: Vec<(u32, VertexId)> =
             self.mesh.halfedges().map(|h| (self.corner[h.index()], self.mesh.from(h))).collect();
         places.sort_unstable();
@@ -142,7 +124,11 @@ impl Surface {
 /// # Errors
 /// [`MeshError`] names the first element that makes the arrays meaningless, or is
 /// [`MeshError::Cancelled`]; also if every face has a non-finite vertex.
-pub fn condition(input: &MeshInput<'_>, options: &ConditionOptions, progress: &Progress) -> Result<Surface, MeshError> {
+pub(crate) fn condition(
+    input: &MeshInput<'_>,
+    options: &ConditionOptions,
+    progress: &Progress,
+) -> Result<Surface, MeshError> {
     let polygons = Polygons::new(input)?;
     progress.check()?;
     let mut defects = Defects::default();
@@ -261,8 +247,6 @@ fn surface_of(
         polygon: triangulation.polygon,
         corner: assembled.corner,
         vertex,
-        diagonal: assembled.diagonal,
-        reversed: assembled.reversed,
         defects,
         scale: unit,
         ..Surface::default()
@@ -352,8 +336,8 @@ impl InnerEdges {
 struct Assembled {
     corner: Vec<u32>,
     twin: Vec<HalfedgeId>,
+    /// Whether a half-edge runs inside a polygon.
     diagonal: Vec<bool>,
-    reversed: Vec<bool>,
 }
 
 fn assemble(triangulation: &Triangulation, inner: InnerEdges, orientation: &Orientation) -> Assembled {
@@ -380,7 +364,7 @@ fn assemble(triangulation: &Triangulation, inner: InnerEdges, orientation: &Orie
             twin[to] = turned(t);
         }
     }
-    Assembled { corner, twin, diagonal, reversed }
+    Assembled { corner, twin, diagonal }
 }
 
 /// For each half-edge whether its ends are those of a guide; nothing where there are no guides. Vertices that are welded

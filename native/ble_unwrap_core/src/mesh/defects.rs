@@ -2,7 +2,7 @@
 
 /// How often a defect occurs, and where first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Defect<T> {
+pub(crate) struct Defect<T> {
     /// Number of occurrences.
     pub count: usize,
     /// The first one, by index; `None` if there is none.
@@ -28,7 +28,7 @@ impl<T: Copy> Defect<T> {
 /// Vertices, edges (vertex pairs) and faces are those of the input; vertices and faces that merely
 /// coincide are no defects.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Defects {
+pub(crate) struct Defects {
     /// Edges with more than two faces: the flattest pairs stay joined, the rest is cut.
     pub non_manifold_edges: Defect<[u32; 2]>,
     /// Edges cut because the surface has one side only, as a Möbius strip.
@@ -56,12 +56,6 @@ pub struct Defects {
 }
 
 impl Defects {
-    /// Whether nothing was found.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        *self == Self::default()
-    }
-
     /// Gives faces other numbers, those of [`Self::unmapped_faces`] excepted.
     pub(super) fn renumber_faces(&mut self, number: impl Fn(u32) -> u32) {
         for faces in [
@@ -80,7 +74,7 @@ impl Defects {
     /// Welding and winding that agree with what was asked for are no reason to worry an artist and
     /// are left to the counts.
     #[must_use]
-    pub fn warnings(&self) -> Vec<String> {
+    pub(crate) fn warnings(&self) -> Vec<String> {
         let edge = |e: [u32; 2]| format!("between vertices {} and {}", e[0], e[1]);
         let vertex = |v: u32| format!("vertex {v}");
         let face = |f: u32| format!("face {f}");
@@ -149,7 +143,7 @@ mod tests {
     #[test]
     fn warnings_name_the_first_element() {
         let mut d = Defects::default();
-        assert!(d.is_empty() && d.warnings().is_empty());
+        assert!(d == Defects::default() && d.warnings().is_empty());
         d.non_manifold_edges.found([3, 9]);
         d.non_manifold_edges.found([4, 5]);
         d.repeated_vertices.found(7);

@@ -2,7 +2,7 @@
 
 /// Several lists in two arrays: group `g` is `items[offsets[g]..offsets[g + 1]]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Groups<T> {
+pub(crate) struct Groups<T> {
     offsets: Vec<usize>,
     items: Vec<T>,
 }
@@ -16,14 +16,14 @@ impl<T> Default for Groups<T> {
 impl<T: Copy> Groups<T> {
     /// No groups.
     #[must_use]
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self::default()
     }
 
     /// Sorts `0..labels.len()` into `count` groups by label, in ascending order within each.
     /// Items whose label is `count` or more are left out.
     #[must_use]
-    pub fn by_label(labels: &[u32], count: usize, item: impl Fn(usize) -> T) -> Self {
+    pub(crate) fn by_label(labels: &[u32], count: usize, item: impl Fn(usize) -> T) -> Self {
         let mut offsets = vec![0usize; count + 1];
         for &label in labels {
             if (label as usize) < count {
@@ -45,35 +45,29 @@ impl<T: Copy> Groups<T> {
     }
 
     /// Appends an item to the last, still open group.
-    pub fn push(&mut self, item: T) {
+    pub(crate) fn push(&mut self, item: T) {
         self.items.push(item);
     }
 
     /// Closes the open group; what is pushed next belongs to a new one.
-    pub fn close(&mut self) {
+    pub(crate) fn close(&mut self) {
         self.offsets.push(self.items.len());
     }
 
     /// Number of closed groups.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.offsets.len() - 1
-    }
-
-    /// Whether there is no closed group.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// The items of group `g`.
     #[must_use]
-    pub fn group(&self, g: usize) -> &[T] {
+    pub(crate) fn group(&self, g: usize) -> &[T] {
         &self.items[self.offsets[g]..self.offsets[g + 1]]
     }
 
     /// All groups in order.
-    pub fn iter(&self) -> impl ExactSizeIterator<Item = &[T]> + '_ {
+    pub(crate) fn iter(&self) -> impl ExactSizeIterator<Item = &[T]> + '_ {
         self.offsets.windows(2).map(|w| &self.items[w[0]..w[1]])
     }
 }

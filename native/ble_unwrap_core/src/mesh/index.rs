@@ -7,11 +7,11 @@ macro_rules! index {
         $(#[$doc])*
         #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
         #[repr(transparent)]
-        pub struct $name(u32);
+        pub(crate) struct $name(u32);
 
         impl $name {
             /// Stands for "none" where an index is optional and kept in a flat array.
-            pub const NONE: Self = Self(u32::MAX);
+            pub(crate) const NONE: Self = Self(u32::MAX);
 
             /// Wraps a position in a flat array.
             ///
@@ -20,7 +20,7 @@ macro_rules! index {
             /// [`condition`](super::condition()) checks before any index is made.
             #[inline]
             #[must_use]
-            pub fn new(index: usize) -> Self {
+            pub(crate) fn new(index: usize) -> Self {
                 debug_assert!(index < u32::MAX as usize, "index {index} does not fit in 32 bits");
                 #[expect(clippy::cast_possible_truncation, reason = "checked on entry")]
                 Self(index as u32)
@@ -29,14 +29,14 @@ macro_rules! index {
             /// The position in a flat array.
             #[inline]
             #[must_use]
-            pub fn index(self) -> usize {
+            pub(crate) fn index(self) -> usize {
                 self.0 as usize
             }
 
             /// Whether this is [`Self::NONE`].
             #[inline]
             #[must_use]
-            pub fn is_none(self) -> bool {
+            pub(crate) fn is_none(self) -> bool {
                 self == Self::NONE
             }
         }
@@ -72,7 +72,7 @@ impl FaceId {
     /// The half-edge that leaves corner `slot` (0, 1 or 2) of this face.
     #[inline]
     #[must_use]
-    pub fn halfedge(self, slot: usize) -> HalfedgeId {
+    pub(crate) fn halfedge(self, slot: usize) -> HalfedgeId {
         debug_assert!(slot < 3, "a triangle has no corner {slot}");
         HalfedgeId::new(3 * self.index() + slot)
     }
@@ -80,7 +80,7 @@ impl FaceId {
     /// The three half-edges in order.
     #[inline]
     #[must_use]
-    pub fn halfedges(self) -> [HalfedgeId; 3] {
+    pub(crate) fn halfedges(self) -> [HalfedgeId; 3] {
         [0, 1, 2].map(|slot| self.halfedge(slot))
     }
 }
@@ -89,28 +89,28 @@ impl HalfedgeId {
     /// The face this half-edge belongs to.
     #[inline]
     #[must_use]
-    pub fn face(self) -> FaceId {
+    pub(crate) fn face(self) -> FaceId {
         FaceId::new(self.index() / 3)
     }
 
     /// Which of the face's corners it leaves: 0, 1 or 2.
     #[inline]
     #[must_use]
-    pub fn slot(self) -> usize {
+    pub(crate) fn slot(self) -> usize {
         self.index() % 3
     }
 
     /// The next half-edge of the same face, counter-clockwise.
     #[inline]
     #[must_use]
-    pub fn next(self) -> Self {
+    pub(crate) fn next(self) -> Self {
         if self.slot() == 2 { Self::new(self.index() - 2) } else { Self::new(self.index() + 1) }
     }
 
     /// The previous half-edge of the same face.
     #[inline]
     #[must_use]
-    pub fn prev(self) -> Self {
+    pub(crate) fn prev(self) -> Self {
         if self.slot() == 0 { Self::new(self.index() + 2) } else { Self::new(self.index() - 1) }
     }
 }

@@ -4,12 +4,13 @@ use std::ops::Range;
 
 use thiserror::Error;
 
+use crate::error_kind::ErrorKind;
 use crate::progress::Cancelled;
 
 /// Polygons as flat arrays, as Blender and most exchange formats keep them.
 ///
 /// Face `f` has the corners `face_offsets[f]..face_offsets[f + 1]`, each of which names a vertex.
-/// Anything may be wrong with the arrays: [`condition`](super::condition()) checks all of them.
+/// Anything may be wrong with the arrays: every function that takes them checks all of them.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MeshInput<'a> {
     /// Coordinates of the vertices, in any unit.
@@ -28,6 +29,7 @@ pub struct MeshInput<'a> {
 
 /// Why a mesh cannot be unwrapped at all. Numbers count from 0, as the arrays do.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum MeshError {
     /// The offsets do not begin at corner 0.
     #[error("the face offsets begin at {first}; they must begin at 0")]
@@ -154,6 +156,28 @@ pub enum MeshError {
     /// The caller asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl MeshError {
+    /// What kind of error this is.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::OffsetsStart { .. }
+            | Self::OffsetsEnd { .. }
+            | Self::OffsetsMissing { .. }
+            | Self::OffsetsDescend { .. }
+            | Self::TooFewCorners { .. }
+            | Self::VertexOutOfRange { .. }
+            | Self::TriangleCornerOutOfRange { .. }
+            | Self::TriangleAcrossFaces { .. }
+            | Self::SeamOutOfRange { .. }
+            | Self::GuideOutOfRange { .. }
+            | Self::TooLarge { .. }
+            | Self::NoFiniteFace { .. } => ErrorKind::Mesh,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
 }
 
 /// Most elements of one kind: indices of the input are 32-bit signed.

@@ -14,21 +14,22 @@ mod groups;
 mod index;
 mod input;
 mod irregular;
-pub mod measure;
+pub(crate) mod measure;
 mod orient;
 mod quad;
 #[cfg(test)]
 pub(crate) mod test_surfaces;
+#[cfg(test)]
+mod tests;
 mod tri_mesh;
 mod triangulate;
 mod weld;
 
-pub use coarsen::{Coarse, coarsen};
-pub use condition::{ConditionOptions, Surface, condition};
-pub use defects::{Defect, Defects};
+pub(crate) use coarsen::{Coarse, coarsen};
+pub(crate) use condition::{ConditionOptions, Surface, condition};
 pub(crate) use disjoint_sets::DisjointSets;
-pub use groups::Groups;
-pub use index::{FaceId, HalfedgeId, VertexId};
+pub(crate) use groups::Groups;
+pub(crate) use index::{FaceId, HalfedgeId, VertexId};
 pub use input::{MeshError, MeshInput};
-pub use quad::{Quad, is_convex};
-pub use tri_mesh::{Topology, TriMesh};
+pub(crate) use quad::{Quad, is_convex};
+pub(crate) use tri_mesh::{Topology, TriMesh};

@@ -14,7 +14,7 @@ const STRAIGHT: f64 = 1e-6;
 
 /// A polygon of two triangles in a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Quad {
+pub(crate) struct Quad {
     /// The diagonal that its triangles share, on its lower side.
     pub diagonal: HalfedgeId,
 }
@@ -24,7 +24,7 @@ impl Quad {
     ///
     /// # Panics
     /// If `polygon` does not name one a face.
-    pub fn all<'a>(mesh: &'a TriMesh, polygon: &'a [u32]) -> impl Iterator<Item = Self> + 'a {
+    pub(crate) fn all<'a>(mesh: &'a TriMesh, polygon: &'a [u32]) -> impl Iterator<Item = Self> + 'a {
         assert_eq!(polygon.len(), mesh.face_count(), "one polygon a face");
         let inside = move |h: HalfedgeId| {
             let t = mesh.twin(h);
@@ -41,21 +41,21 @@ impl Quad {
 
     /// The corners in order; the first and the third are the ends of the diagonal.
     #[must_use]
-    pub fn corners(self, mesh: &TriMesh) -> [VertexId; 4] {
+    pub(crate) fn corners(self, mesh: &TriMesh) -> [VertexId; 4] {
         let (h, t) = (self.diagonal, mesh.twin(self.diagonal));
         [mesh.from(h), mesh.from(t.prev()), mesh.to(h), mesh.from(h.prev())]
     }
 
     /// The triangles that the other diagonal makes, wound as the quad.
     #[must_use]
-    pub fn other_halves(self, mesh: &TriMesh) -> [[VertexId; 3]; 2] {
+    pub(crate) fn other_halves(self, mesh: &TriMesh) -> [[VertexId; 3]; 2] {
         let [a, b, c, d] = self.corners(mesh);
         [[a, b, d], [b, c, d]]
     }
 
     /// Whether the quad is [convex](is_convex) on the surface.
     #[must_use]
-    pub fn is_convex(self, mesh: &TriMesh) -> bool {
+    pub(crate) fn is_convex(self, mesh: &TriMesh) -> bool {
         is_convex(self.corners(mesh).map(|v| mesh.position(v)))
     }
 }
@@ -64,7 +64,7 @@ impl Quad {
 /// and each of these triangles at least a millionth of the quad seen so. A warped quad may well be; one with a straight or
 /// a reflex corner, without an area or with a coordinate that is not finite is not. Scale does not matter.
 #[must_use]
-pub fn is_convex(p: [Point3<f64>; 4]) -> bool {
+pub(crate) fn is_convex(p: [Point3<f64>; 4]) -> bool {
     // Halves, and a unit that makes the largest difference 1: no square overflows or vanishes.
     let from_first = [1, 2, 3].map(|k: usize| p[k].coords * 0.5 - p[0].coords * 0.5);
     let unit = from_first.iter().map(Vector3::amax).fold(0.0, f64::max);

@@ -10,14 +10,14 @@ use super::index::{FaceId, HalfedgeId, VertexId};
 /// The corner *is* the half-edge: half-edge `3·f + k` leaves corner `k` of face `f` towards
 /// corner `k + 1`. `twin` holds the opposite half-edge, or [`HalfedgeId::NONE`] on a boundary.
 ///
-/// Guaranteed (see [`TriMesh::check_invariants`]): twins are mutual and opposed; the corners of a
+/// Guaranteed (`check_invariants` tests it): twins are mutual and opposed; the corners of a
 /// vertex form one fan, so there is no bow-tie; every vertex is used by a face.
 ///
 /// Not guaranteed: being connected, having a boundary, positive areas, distinct positions.
 ///
 /// Edges may be marked as guides, which the borders of charts should follow; parts keep the marks.
 #[derive(Clone, Debug, Default)]
-pub struct TriMesh {
+pub(crate) struct TriMesh {
     positions: Vec<Point3<f64>>,
     triangles: Vec<[VertexId; 3]>,
     twin: Vec<HalfedgeId>,
@@ -36,7 +36,7 @@ const LARGE_PART: usize = 16;
 
 /// Counts of the cells of a mesh, and what follows from them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Topology {
+pub(crate) struct Topology {
     /// Number of vertices.
     pub vertices: usize,
     /// Number of edges, an edge and its twin counted once.
@@ -52,13 +52,13 @@ pub struct Topology {
 impl Topology {
     /// Euler characteristic V − E + F.
     #[must_use]
-    pub fn euler(&self) -> i64 {
+    pub(crate) fn euler(&self) -> i64 {
         self.vertices as i64 - self.edges as i64 + self.faces as i64
     }
 
     /// Genus summed over the components: (2C − L − χ) / 2.
     #[must_use]
-    pub fn genus(&self) -> usize {
+    pub(crate) fn genus(&self) -> usize {
         let twice = 2 * self.components as i64 - self.loops as i64 - self.euler();
         debug_assert!(twice >= 0 && twice % 2 == 0, "not an oriented manifold: {self:?}");
         usize::try_from(twice / 2).unwrap_or(0)
@@ -66,13 +66,13 @@ impl Topology {
 
     /// Whether the mesh can be a chart: connected, genus 0, with a boundary.
     #[must_use]
-    pub fn is_chart(&self) -> bool {
+    pub(crate) fn is_chart(&self) -> bool {
         self.components == 1 && self.loops >= 1 && self.genus() == 0
     }
 
     /// Whether the mesh is a topological disk.
     #[must_use]
-    pub fn is_disk(&self) -> bool {
+    pub(crate) fn is_disk(&self) -> bool {
         self.is_chart() && self.loops == 1
     }
 }
@@ -88,7 +88,7 @@ impl TriMesh {
     /// # Panics
     /// If the arrays differ in length or the length is no multiple of three.
     #[must_use]
-    pub fn from_glued(
+    pub(crate) fn from_glued(
         corner_source: &[u32],
         twin: Vec<HalfedgeId>,
         position: impl Fn(u32) -> Point3<f64>,
@@ -139,8 +139,9 @@ impl TriMesh {
     /// unglued. Unused positions vanish and bow-ties split, so vertex numbers may differ from the
     /// input; the second value gives the source of each vertex. Meant for clean meshes and tests;
     /// [`condition`](super::condition()) accepts anything.
+    #[cfg(test)]
     #[must_use]
-    pub fn from_triangles(positions: &[Point3<f64>], triangles: &[[u32; 3]]) -> (Self, Vec<u32>) {
+    pub(crate) fn from_triangles(positions: &[Point3<f64>], triangles: &[[u32; 3]]) -> (Self, Vec<u32>) {
         let corners: Vec<u32> = triangles.iter().flatten().copied().collect();
         let end = |h: usize| corners[HalfedgeId::new(h).next().index()];
         let mut keys: Vec<(u32, u32, usize)> =
@@ -163,7 +164,7 @@ impl TriMesh {
     /// `is_cut` holds (asked once a side). Returns it with the source of each vertex; face `i` of
     /// the part is `faces[i]`. O(m log m) in the number m of faces of the part, O(n) at most.
     #[must_use]
-    pub fn submesh(&self, faces: &[FaceId], is_cut: impl Fn(HalfedgeId) -> bool) -> (Self, Vec<VertexId>) {
+    pub(crate) fn submesh(&self, faces: &[FaceId], is_cut: impl Fn(HalfedgeId) -> bool) -> (Self, Vec<VertexId>) {
         if faces.len() >= self.face_count() / LARGE_PART {
             let mut place = vec![FaceId::NONE; self.face_count()];
             for (i, f) in faces.iter().enumerate() {
@@ -184,7 +185,7 @@ impl TriMesh {
     /// # Panics
     /// If the groups hold a face twice.
     #[must_use]
-    pub fn partition(&self, groups: &Groups<FaceId>) -> Vec<(Self, Vec<VertexId>)> {
+    pub(crate) fn partition(&self, groups: &Groups<FaceId>) -> Vec<(Self, Vec<VertexId>)> {
         let mut place = vec![(u32::MAX, 0usize); self.face_count()];
         for (g, faces) in groups.iter().enumerate() {
             for (i, f) in faces.iter().enumerate() {
@@ -228,124 +229,124 @@ impl TriMesh {
     /// Number of vertices.
     #[inline]
     #[must_use]
-    pub fn vertex_count(&self) -> usize {
+    pub(crate) fn vertex_count(&self) -> usize {
         self.positions.len()
     }
 
     /// Number of triangles.
     #[inline]
     #[must_use]
-    pub fn face_count(&self) -> usize {
+    pub(crate) fn face_count(&self) -> usize {
         self.triangles.len()
     }
 
     /// Number of half-edges: three a triangle.
     #[inline]
     #[must_use]
-    pub fn halfedge_count(&self) -> usize {
+    pub(crate) fn halfedge_count(&self) -> usize {
         self.twin.len()
     }
 
     /// All vertices in order.
-    pub fn vertices(&self) -> impl ExactSizeIterator<Item = VertexId> + Clone + use<> {
+    pub(crate) fn vertices(&self) -> impl ExactSizeIterator<Item = VertexId> + Clone + use<> {
         (0..self.vertex_count()).map(VertexId::new)
     }
 
     /// All faces in order.
-    pub fn faces(&self) -> impl ExactSizeIterator<Item = FaceId> + Clone + use<> {
+    pub(crate) fn faces(&self) -> impl ExactSizeIterator<Item = FaceId> + Clone + use<> {
         (0..self.face_count()).map(FaceId::new)
     }
 
     /// All half-edges in order.
-    pub fn halfedges(&self) -> impl ExactSizeIterator<Item = HalfedgeId> + Clone + use<> {
+    pub(crate) fn halfedges(&self) -> impl ExactSizeIterator<Item = HalfedgeId> + Clone + use<> {
         (0..self.halfedge_count()).map(HalfedgeId::new)
     }
 
     /// Each edge once: boundary half-edges, and of a twin pair the one of lower index.
-    pub fn edges(&self) -> impl Iterator<Item = HalfedgeId> + '_ {
+    pub(crate) fn edges(&self) -> impl Iterator<Item = HalfedgeId> + '_ {
         self.halfedges().filter(|&h| self.twin(h).is_none() || h < self.twin(h))
     }
 
     /// Coordinates of a vertex.
     #[inline]
     #[must_use]
-    pub fn position(&self, v: VertexId) -> Point3<f64> {
+    pub(crate) fn position(&self, v: VertexId) -> Point3<f64> {
         self.positions[v.index()]
     }
 
     /// Coordinates of all vertices.
     #[inline]
     #[must_use]
-    pub fn positions(&self) -> &[Point3<f64>] {
+    pub(crate) fn positions(&self) -> &[Point3<f64>] {
         &self.positions
     }
 
     /// The corners of all triangles.
     #[inline]
     #[must_use]
-    pub fn triangles(&self) -> &[[VertexId; 3]] {
+    pub(crate) fn triangles(&self) -> &[[VertexId; 3]] {
         &self.triangles
     }
 
     /// The corners of a triangle.
     #[inline]
     #[must_use]
-    pub fn triangle(&self, f: FaceId) -> [VertexId; 3] {
+    pub(crate) fn triangle(&self, f: FaceId) -> [VertexId; 3] {
         self.triangles[f.index()]
     }
 
     /// The corner positions of a triangle.
     #[inline]
     #[must_use]
-    pub fn triangle_positions(&self, f: FaceId) -> [Point3<f64>; 3] {
+    pub(crate) fn triangle_positions(&self, f: FaceId) -> [Point3<f64>; 3] {
         self.triangle(f).map(|v| self.position(v))
     }
 
     /// The vertex a half-edge leaves.
     #[inline]
     #[must_use]
-    pub fn from(&self, h: HalfedgeId) -> VertexId {
+    pub(crate) fn from(&self, h: HalfedgeId) -> VertexId {
         self.triangles[h.face().index()][h.slot()]
     }
 
     /// The vertex a half-edge points to.
     #[inline]
     #[must_use]
-    pub fn to(&self, h: HalfedgeId) -> VertexId {
+    pub(crate) fn to(&self, h: HalfedgeId) -> VertexId {
         self.from(h.next())
     }
 
     /// The opposite half-edge, or [`HalfedgeId::NONE`] on a boundary.
     #[inline]
     #[must_use]
-    pub fn twin(&self, h: HalfedgeId) -> HalfedgeId {
+    pub(crate) fn twin(&self, h: HalfedgeId) -> HalfedgeId {
         self.twin[h.index()]
     }
 
     /// Whether no face lies on the other side.
     #[inline]
     #[must_use]
-    pub fn is_boundary(&self, h: HalfedgeId) -> bool {
+    pub(crate) fn is_boundary(&self, h: HalfedgeId) -> bool {
         self.twin(h).is_none()
     }
 
     /// Whether a vertex lies on a boundary loop.
     #[inline]
     #[must_use]
-    pub fn is_boundary_vertex(&self, v: VertexId) -> bool {
+    pub(crate) fn is_boundary_vertex(&self, v: VertexId) -> bool {
         self.is_boundary(self.outgoing[v.index()])
     }
 
     /// Length of an edge.
     #[inline]
     #[must_use]
-    pub fn edge_length(&self, h: HalfedgeId) -> f64 {
+    pub(crate) fn edge_length(&self, h: HalfedgeId) -> f64 {
         (self.position(self.to(h)) - self.position(self.from(h))).norm()
     }
 
     /// Length of all boundary loops together, summed in the order of half-edges.
     #[must_use]
-    pub fn boundary_length(&self) -> f64 {
+    pub(crate) fn boundary_length(&self) -> f64 {
         self.halfedges().filter(|&h| self.is_boundary(h)).map(|h| self.edge_length(h)).sum()
     }
 
@@ -354,7 +355,7 @@ impl TriMesh {
     /// # Panics
     /// If there is neither a mark for each half-edge nor none at all.
     #[must_use]
-    pub fn with_guides(self, guide: Vec<bool>) -> Self {
+    pub(crate) fn with_guides(self, guide: Vec<bool>) -> Self {
         assert!(guide.is_empty() || guide.len() == self.twin.len(), "one mark a half-edge");
         Self { guide: if guide.contains(&true) { guide } else { Vec::new() }, ..self }
     }
@@ -362,28 +363,28 @@ impl TriMesh {
     /// Whether any edge is a guide.
     #[inline]
     #[must_use]
-    pub fn has_guides(&self) -> bool {
+    pub(crate) fn has_guides(&self) -> bool {
         !self.guide.is_empty()
     }
 
     /// Whether the borders of charts should follow an edge.
     #[inline]
     #[must_use]
-    pub fn is_guide(&self, h: HalfedgeId) -> bool {
+    pub(crate) fn is_guide(&self, h: HalfedgeId) -> bool {
         self.guide.get(h.index()).is_some_and(|guide| *guide)
     }
 
     /// What a border along an edge costs beside the same border where there is no guide: 1, or less on a guide.
     #[inline]
     #[must_use]
-    pub fn border_cost(&self, h: HalfedgeId) -> f64 {
+    pub(crate) fn border_cost(&self, h: HalfedgeId) -> f64 {
         if self.is_guide(h) { GUIDE_COST } else { 1.0 }
     }
 
     /// The half-edges that leave `v`, counter-clockwise; on a boundary from the half-edge without a
     /// twin. The neighbours of `v` are their ends and, on a boundary, the start of the last one's
     /// [`prev`](HalfedgeId::prev).
-    pub fn outgoing(&self, v: VertexId) -> impl Iterator<Item = HalfedgeId> + '_ {
+    pub(crate) fn outgoing(&self, v: VertexId) -> impl Iterator<Item = HalfedgeId> + '_ {
         let first = self.outgoing[v.index()];
         let mut current = first;
         std::iter::from_fn(move || {
@@ -400,7 +401,7 @@ impl TriMesh {
     }
 
     /// The vertices joined to `v` by an edge, counter-clockwise.
-    pub fn neighbours(&self, v: VertexId) -> impl Iterator<Item = VertexId> + '_ {
+    pub(crate) fn neighbours(&self, v: VertexId) -> impl Iterator<Item = VertexId> + '_ {
         self.outgoing(v).flat_map(move |h| {
             let last = self.is_boundary(h.prev()).then(|| self.from(h.prev()));
             std::iter::once(self.to(h)).chain(last)
@@ -410,14 +411,14 @@ impl TriMesh {
     /// The boundary half-edge that follows boundary half-edge `h` along its loop.
     #[inline]
     #[must_use]
-    pub fn next_boundary(&self, h: HalfedgeId) -> HalfedgeId {
+    pub(crate) fn next_boundary(&self, h: HalfedgeId) -> HalfedgeId {
         self.outgoing[self.to(h).index()]
     }
 
     /// The boundary loops, each as half-edges in order with the surface on their left; sorted by
     /// lowest half-edge.
     #[must_use]
-    pub fn boundary_loops(&self) -> Groups<HalfedgeId> {
+    pub(crate) fn boundary_loops(&self) -> Groups<HalfedgeId> {
         let mut seen = vec![false; self.halfedge_count()];
         let mut loops = Groups::new();
         for first in self.halfedges() {
@@ -438,7 +439,7 @@ impl TriMesh {
     /// A component label for each face, and the number of components; faces are joined over edges.
     /// Labels ascend with the lowest face.
     #[must_use]
-    pub fn components(&self) -> (Vec<u32>, usize) {
+    pub(crate) fn components(&self) -> (Vec<u32>, usize) {
         let mut label = vec![u32::MAX; self.face_count()];
         let mut count = 0;
         let mut stack = Vec::new();
@@ -464,7 +465,7 @@ impl TriMesh {
 
     /// Cell counts, boundary loops and components.
     #[must_use]
-    pub fn topology(&self) -> Topology {
+    pub(crate) fn topology(&self) -> Topology {
         let boundary = self.twin.iter().filter(|t| t.is_none()).count();
         Topology {
             vertices: self.vertex_count(),
@@ -479,7 +480,8 @@ impl TriMesh {
     ///
     /// # Errors
     /// A sentence that names the offending element.
-    pub fn check_invariants(&self) -> Result<(), String> {
+    #[cfg(test)]
+    pub(crate) fn check_invariants(&self) -> Result<(), String> {
         if self.twin.len() != 3 * self.triangles.len() || self.outgoing.len() != self.positions.len() {
             return Err("array lengths disagree".into());
         }

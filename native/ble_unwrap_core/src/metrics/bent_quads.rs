@@ -11,7 +11,7 @@ use crate::predicates::orientation;
 /// `uv` holds a UV a corner; faces for which `has_uv` does not hold, and those with a UV that is not finite, are left out.
 /// Ascending. The arrays of `input` must be those of a mesh. O(n).
 #[must_use]
-pub fn bent_quads(input: &MeshInput<'_>, uv: &[[f32; 2]], has_uv: impl Fn(usize) -> bool) -> Vec<usize> {
+pub(crate) fn bent_quads(input: &MeshInput<'_>, uv: &[[f32; 2]], has_uv: impl Fn(usize) -> bool) -> Vec<usize> {
     let faces = input.face_offsets.windows(2).enumerate();
     let is_bent_quad = |&(face, ends): &(usize, &[i32])| {
         let Ok(first) = usize::try_from(ends[0]) else { return false };

@@ -31,6 +31,7 @@ const RANGE_SLACK: f64 = 1e-5;
 
 /// The figures of one chart.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ChartMeasures {
     /// Lowest triangle of the chart.
     pub first_triangle: usize,
@@ -48,6 +49,7 @@ pub struct ChartMeasures {
 /// with finite UVs and degenerate neither on the surface nor in UV; NaN if there are none. A flipped
 /// triangle enters them with the absolute value of its area.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Measures {
     /// Charts: sets of triangles connected over UV edges.
     pub charts: usize,
@@ -113,12 +115,12 @@ pub struct Measures {
 /// layout leaves the unit square.
 ///
 /// Guaranteed: no number in `mesh` makes it panic, and the result does not depend on the number of
-/// threads. Not guaranteed: exactness. Overlaps below the threshold go unseen; [`verify`](crate::verify())
+/// threads. Not guaranteed: exactness. Overlaps below the threshold go unseen; [`verify`](crate::verify::verify())
 /// is exact. O(n log n); about two seconds for a million triangles on two cores.
 ///
 /// # Errors
 /// [`Cancelled`].
-pub fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Cancelled> {
+pub(crate) fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Cancelled> {
     let m = mesh.triangle_count();
     memory::require((m as u64).saturating_mul(OF_TRIANGLE)).map_err(Cancelled::OutOfMemory)?;
     let (positions, unit) = unit_positions(mesh);

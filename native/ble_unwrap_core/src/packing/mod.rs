@@ -59,12 +59,14 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::choice::choices;
+use crate::error_kind::ErrorKind;
 use crate::memory;
 use crate::progress::{Cancelled, Progress};
 use outline::Outline;
 
 /// Which rotations a chart may take. It is never mirrored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Rotation {
     /// Any angle.
     Any,
@@ -82,6 +84,7 @@ choices!(Rotation {
 
 /// How long to search for a dense placement. Neither looks at a clock: work is counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Quality {
     /// A twentieth of a second for up to some dozen charts, a fifth for some hundred.
     Fast,
@@ -89,7 +92,7 @@ pub enum Quality {
     High,
 }
 
-/// Settings of [`pack`].
+/// How charts are packed, and into which texture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PackSettings {
     /// Least distance of two charts, and twice the least distance from the border, in texels. At
@@ -139,7 +142,7 @@ impl Default for PackSettings {
 /// Triangles may overlap, be turned over or have no area; all of them keep the margin to other
 /// charts, none to those of the same chart. Points no triangle uses do not matter.
 #[derive(Clone, Copy, Debug)]
-pub struct PackItem<'a> {
+pub(crate) struct PackItem<'a> {
     /// Points of the chart plane.
     pub points: &'a [Point2<f64>],
     /// Triangles as indices of points. Triangles that share indices are packed faster.
@@ -149,7 +152,7 @@ pub struct PackItem<'a> {
 /// A similarity without mirroring, from a chart plane to texels: turn about `centre`, scale, put
 /// `centre` at `offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose {
+pub(crate) struct Pose {
     /// Cosine of the angle.
     pub cos: f64,
     /// Sine of the angle.
@@ -166,7 +169,7 @@ impl Pose {
     /// Where a point of the chart plane goes, in texels.
     #[inline]
     #[must_use]
-    pub fn texel(&self, p: Point2<f64>) -> Point2<f64> {
+    pub(crate) fn texel(&self, p: Point2<f64>) -> Point2<f64> {
         let d = (p - self.centre) * self.scale;
         Point2::new(self.cos * d.x - self.sin * d.y, self.sin * d.x + self.cos * d.y) + self.offset
     }
@@ -174,7 +177,7 @@ impl Pose {
 
 /// The result of [`pack`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct Packed {
+pub(crate) struct Packed {
     /// A pose an item, in their order.
     pub poses: Vec<Pose>,
     /// Area covered by charts over the area of the texture. A chart that overlaps itself counts its
@@ -188,21 +191,9 @@ pub struct Packed {
     pub size: [u32; 2],
 }
 
-impl Packed {
-    /// UV of a point of item `item`.
-    ///
-    /// # Panics
-    /// If there is no such item.
-    #[inline]
-    #[must_use]
-    pub fn uv(&self, item: usize, p: Point2<f64>) -> Point2<f64> {
-        let texel = self.poses[item].texel(p);
-        Point2::new(texel.x / f64::from(self.size[0]), texel.y / f64::from(self.size[1]))
-    }
-}
-
 /// Why charts could not be packed.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum PackError {
     /// A texture without texels, or too large for f32 coordinates to tell fractions of a texel.
     #[error(
@@ -272,6 +263,22 @@ pub enum PackError {
     Cancelled(#[from] Cancelled),
 }
 
+impl PackError {
+    /// What kind of error this is.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::TextureSize { .. }
+            | Self::Margin { .. }
+            | Self::MarginTooLarge { .. }
+            | Self::TooManyCharts { .. }
+            | Self::NotFinite { .. }
+            | Self::CornerOutOfRange { .. } => ErrorKind::Argument,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
 /// What a triangle takes while its outline is found, and what a chart in many poses does, in bytes.
 const OF_TRIANGLE: u64 = 256;
 const OF_ITEM: u64 = 8 << 10;
@@ -300,7 +307,7 @@ fn require_memory(items: &[PackItem<'_>]) -> Result<(), Cancelled> {
 ///
 /// # Errors
 /// [`PackError`]; [`PackError::Cancelled`] takes precedence only over errors not yet found.
-pub fn pack(items: &[PackItem<'_>], settings: &PackSettings, progress: &Progress) -> Result<Packed, PackError> {
+pub(crate) fn pack(items: &[PackItem<'_>], settings: &PackSettings, progress: &Progress) -> Result<Packed, PackError> {
     settings.check()?;
     progress.check()?;
     require_memory(items)?;

@@ -118,8 +118,8 @@ fn square(size: u32, margin_texels: f64) -> PackSettings {
 fn final_triangles(packed: &Packed, item: usize, chart: &Chart) -> Vec<[Point2<f64>; 3]> {
     let [w, h] = packed.size.map(f64::from);
     let at = |v: u32| {
-        let uv = packed.uv(item, chart.0[v as usize]);
-        Point2::new(f64::from(uv.x as f32) * w, f64::from(uv.y as f32) * h)
+        let texel = packed.poses[item].texel(chart.0[v as usize]);
+        Point2::new(f64::from((texel.x / w) as f32) * w, f64::from((texel.y / h) as f32) * h)
     };
     chart.1.iter().map(|t| t.map(at)).collect()
 }

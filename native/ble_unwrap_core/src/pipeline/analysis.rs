@@ -36,35 +36,38 @@ pub struct Analysis {
 }
 
 impl Analysis {
-    /// Copies the mesh and conditions it; `conditioning` as of the [`Settings`] it will be unwrapped with. O(n log n).
+    /// Copies the mesh and conditions it, as the settings it will be unwrapped with say: of these `weld` and `weld_distance`
+    /// count. O(n log n).
     ///
     /// # Errors
-    /// [`UnwrapError::Mesh`] if the arrays do not make a mesh; [`UnwrapError::Setting`] if the weld distance is negative or not
-    /// finite; cancelled.
-    pub fn new(
-        input: &MeshInput<'_>,
-        conditioning: &ConditionOptions,
-        progress: &Progress,
-    ) -> Result<Self, UnwrapError> {
+    /// [`UnwrapError::Mesh`] if the arrays do not make a mesh; [`UnwrapError::Setting`] if a setting is out of its range;
+    /// cancelled.
+    pub fn new(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -> Result<Self, UnwrapError> {
         progress.check()?;
-        let ConditionOptions { weld, weld_distance } = *conditioning;
-        Settings { weld, weld_distance, ..Settings::default() }.validate()?;
+        settings.validate()?;
         progress.enter(Stage::Condition);
-        let prepared = Prepared::new(input, conditioning, progress)?;
+        let conditioning = settings.conditioning();
+        let prepared = Prepared::new(input, &conditioning, progress)?;
         Ok(Self {
             memo: Memo::new(prepared.surface.mesh.face_count()),
             prepared,
             positions: input.positions.to_vec(),
             corner_vertices: input.corner_vertices.to_vec(),
             face_offsets: input.face_offsets.to_vec(),
-            conditioning: *conditioning,
+            conditioning,
         })
     }
 
-    /// What the mesh was conditioned with.
+    /// Whether vertices at the same position count as one.
     #[must_use]
-    pub fn conditioning(&self) -> &ConditionOptions {
-        &self.conditioning
+    pub fn weld(&self) -> bool {
+        self.conditioning.weld
+    }
+
+    /// How near to each other such vertices are; `None` for what single precision cannot tell apart.
+    #[must_use]
+    pub fn weld_distance(&self) -> Option<f64> {
+        self.conditioning.weld_distance
     }
 
     /// Number of faces of the mesh.
@@ -214,7 +217,7 @@ mod tests {
         (positions, (0..12).collect(), (0..=12).step_by(3).collect())
     }
 
-    fn analysed(conditioning: &ConditionOptions) -> Analysis {
+    fn analysed(settings: &Settings) -> Analysis {
         let (positions, corner_vertices, face_offsets) = squares();
         let input = MeshInput {
             positions: &positions,
@@ -222,7 +225,7 @@ mod tests {
             face_offsets: &face_offsets,
             ..MeshInput::default()
         };
-        Analysis::new(&input, conditioning, &Progress::new()).expect("a mesh")
+        Analysis::new(&input, settings, &Progress::new()).expect("a mesh")
     }
 
     #[test]
@@ -236,7 +239,7 @@ mod tests {
         };
         let settings = Settings { weld: true, ..Settings::default() };
         let once = crate::unwrap(&input, &settings, &Progress::new()).expect("unwraps");
-        let analysis = analysed(&settings.conditioning());
+        let analysis = analysed(&settings);
         assert_eq!((analysis.face_count(), analysis.prepared.components.len()), (4, 2));
         for other in [settings.clone(), Settings { stretch_limit: 2.0, ..settings.clone() }, settings.clone()] {
             analysis.unwrap(&other, &Progress::new()).expect("unwraps");
@@ -247,7 +250,7 @@ mod tests {
 
     #[test]
     fn it_refuses_what_it_was_not_made_for_by_name() {
-        let analysis = analysed(&ConditionOptions { weld: true, weld_distance: Some(0.1) });
+        let analysis = analysed(&Settings { weld: true, weld_distance: Some(0.1), ..Settings::default() });
         let refused = |settings: Settings| match analysis.unwrap(&settings, &Progress::new()) {
             Err(UnwrapError::Setting { name, .. }) => name,
             other => panic!("{other:?}"),
@@ -262,7 +265,7 @@ mod tests {
             face_offsets: &face_offsets,
             ..MeshInput::default()
         };
-        let negative = ConditionOptions { weld: true, weld_distance: Some(f64::NAN) };
+        let negative = Settings { weld: true, weld_distance: Some(f64::NAN), ..Settings::default() };
         let error = Analysis::new(&input, &negative, &Progress::new()).map(|_| ());
         assert!(matches!(error, Err(UnwrapError::Setting { name: "weld_distance", .. })));
     }
@@ -271,7 +274,7 @@ mod tests {
     fn nothing_is_done_for_who_has_cancelled() {
         let progress = Progress::new();
         progress.cancel();
-        let cancelled = analysed(&ConditionOptions::default()).unwrap(&Settings::default(), &progress);
+        let cancelled = analysed(&Settings::default()).unwrap(&Settings::default(), &progress);
         assert!(matches!(cancelled, Err(UnwrapError::Cancelled(_))));
     }
 }

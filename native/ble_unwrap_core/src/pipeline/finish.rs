@@ -10,7 +10,7 @@ use crate::clock::Clock;
 use crate::distortion;
 use crate::error::UnwrapError;
 use crate::mesh::{self, FaceId, MeshInput, Surface, measure};
-use crate::metrics::{self, Measures, Texture, UvMesh, UvMeshError};
+use crate::metrics::{self, LayoutArrays, Measures, Texture};
 use crate::packing::{self, PackItem, PackSettings, Packed};
 use crate::progress::{Cancelled, Stage};
 use crate::report::{Report, counted};
@@ -52,7 +52,8 @@ pub(super) fn finish(
     mut clock: Clock,
     progress: &Run<'_>,
 ) -> Result<Atlas, UnwrapError> {
-    let arrays = Arrays::new(input, surface);
+    let arrays = LayoutArrays::new(input, surface);
+    let texture = Texture::of(&settings.packing);
     let mut packing = settings.packing.clone();
     let mut round = 0;
     loop {
@@ -63,9 +64,8 @@ pub(super) fn finish(
         let layout = Layout::new(input, surface, &charts, &packing, progress)?;
         clock.lap("pack");
         progress.enter(Stage::Verify);
-        let mesh = arrays.uv_mesh(&layout, settings)?;
-        // The corners are listed as the surface winds its faces: none is reversed to them.
-        let certificate = verify::verify(&mesh, &[], progress)?;
+        let mesh = arrays.uv_mesh(&layout.uv, &layout.face_chart, texture)?;
+        let certificate = verify::verify(&mesh, progress)?;
         round += 1;
         match next_step(&certificate, !layout.broken.is_empty(), round) {
             NextStep::End => {
@@ -189,30 +189,6 @@ fn enlargement(chart: &Chart, factor: f64) -> f64 {
     }
     let wanted = (LEAST_HEIGHT / (factor * height)).min(MOST_EXTENT / (factor * extent));
     if wanted.is_finite() { wanted.max(1.0) } else { 1.0 }
-}
-
-/// The input as one list of triangles, for the checks.
-struct Arrays<'a> {
-    positions: Vec<Point3<f64>>,
-    triangles: Vec<[u32; 3]>,
-    corner_triangles: &'a [[u32; 3]],
-}
-
-impl<'a> Arrays<'a> {
-    /// With the vertices that stand for others in the surface, so that edges count as seams where it has them.
-    fn new(input: &MeshInput<'_>, surface: &'a Surface) -> Self {
-        let corner_triangles = surface.corner.as_chunks().0;
-        let vertex = |c: u32| surface.representative[input.corner_vertices[c as usize] as usize];
-        let triangles = corner_triangles.iter().map(|c| c.map(vertex)).collect();
-        Self { positions: input.positions.iter().map(|&p| Point3::from(p)).collect(), triangles, corner_triangles }
-    }
-
-    fn uv_mesh<'b>(&'b self, layout: &'b Layout, settings: &Settings) -> Result<UvMesh<'b>, UvMeshError> {
-        let pack = &settings.packing;
-        let texture = Texture { width: pack.width, height: pack.height, margin: pack.margin_texels };
-        let (positions, triangles, corners) = (&self.positions, &self.triangles, self.corner_triangles);
-        UvMesh::new(positions, triangles, &layout.uv, corners, &layout.face_chart, texture)
-    }
 }
 
 /// Charts packed and rounded.

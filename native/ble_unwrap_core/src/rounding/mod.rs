@@ -40,7 +40,7 @@ const TRIES: usize = 50_000;
 
 /// What the rounding has to know besides the chart.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rounding {
+pub(crate) struct Rounding {
     /// Size of a texel along u and v.
     pub texel: [f64; 2],
     /// Bounding box diagonal of the whole input mesh, in the unit of the chart's positions.
@@ -49,7 +49,7 @@ pub struct Rounding {
 
 /// A rounded chart.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rounded {
+pub(crate) struct Rounded {
     /// UV of each vertex.
     pub uv: Vec<[f32; 2]>,
     /// Vertices that are not at the float32 point nearest to where they were.
@@ -61,7 +61,7 @@ pub struct Rounded {
 /// Triangles without a positive area in float32.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{} triangles lose their orientation in float32, first {}", .faces.len(), .faces[0])]
-pub struct Unmendable {
+pub(crate) struct Unmendable {
     /// The triangles, ascending; at least one.
     pub faces: Vec<FaceId>,
     /// The best that was found.
@@ -70,7 +70,7 @@ pub struct Unmendable {
 
 /// Why there is nothing rounded.
 #[derive(Clone, Debug, PartialEq, Error)]
-pub enum RoundingError {
+pub(crate) enum RoundingError {
     /// The chart is too small for the float32 grid, or had turned triangles (or NaN).
     #[error(transparent)]
     Unmendable(Unmendable),
@@ -85,7 +85,7 @@ pub enum RoundingError {
 /// Guaranteed: every triangle of the result is strictly positive by an exact test; vertices whose
 /// triangles survive plain rounding are rounded plainly; the result depends on the arguments alone.
 /// Not guaranteed: that all of `halves` are positive (no face is given up for one); that moved boundary vertices leave the boundary simple (they move less than a 64th
-/// of a texel; [`verify`](crate::verify()) tells).
+/// of a texel; [`verify`](crate::verify::verify()) tells).
 ///
 /// O(n) and one pass where nothing breaks; a bounded number of moves otherwise.
 ///
@@ -94,7 +94,7 @@ pub enum RoundingError {
 ///
 /// # Panics
 /// If `uv` does not hold one point a vertex.
-pub fn round_to_f32(
+pub(crate) fn round_to_f32(
     mesh: &TriMesh,
     halves: &[[VertexId; 3]],
     uv: &[Point2<f64>],

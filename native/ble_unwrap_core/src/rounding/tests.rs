@@ -6,7 +6,7 @@ use super::*;
 use crate::mesh::Quad;
 use crate::metrics::{Texture, UvMesh};
 use crate::progress::Progress;
-use crate::verify;
+use crate::verify::verify;
 
 const ROUNDING: Rounding = Rounding { texel: [1.0 / 2048.0; 2], diagonal: 1.5 };
 
@@ -55,7 +55,7 @@ fn is_injective(mesh: &TriMesh, uv: &[[f32; 2]]) -> bool {
     let t: Vec<[u32; 3]> = mesh.triangles().iter().map(|t| t.map(|v| v.index() as u32)).collect();
     let texture = Texture::square(2048, 4.0);
     let soup = UvMesh::new(mesh.positions(), &t, uv, &t, &[], texture).expect("valid arrays");
-    verify(&soup, &[], &Progress::new()).expect("not cancelled").is_valid()
+    verify(&soup, &Progress::new()).expect("not cancelled").is_valid()
 }
 
 fn all_positive(mesh: &TriMesh, uv: &[[f32; 2]]) -> bool {

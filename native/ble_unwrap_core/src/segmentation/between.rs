@@ -13,7 +13,7 @@ use super::{CutGraph, Segmentation, finish_labels};
 ///
 /// # Errors
 /// [`Cancelled`].
-pub fn between(
+pub(crate) fn between(
     mesh: &TriMesh,
     polygon: &[u32],
     places: [&[FaceId]; 2],

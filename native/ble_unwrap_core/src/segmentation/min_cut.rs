@@ -27,7 +27,7 @@ const NONE: u32 = u32::MAX;
 /// the two terminals, source and sink. Capacities are integers, so that the cut does not depend on
 /// rounding or on the order of sums.
 #[derive(Clone, Debug)]
-pub struct CutGraph {
+pub(crate) struct CutGraph {
     edges: Vec<(u32, u32, i64)>,
     /// Capacity from the source and to the sink.
     terminals: Vec<[i64; 2]>,
@@ -35,11 +35,11 @@ pub struct CutGraph {
 
 impl CutGraph {
     /// Larger capacities count as this: sums over all edges of a graph must not overflow.
-    pub const MAX_CAPACITY: u64 = 1 << 30;
+    pub(crate) const MAX_CAPACITY: u64 = 1 << 30;
 
     /// A graph of `n` nodes without edges.
     #[must_use]
-    pub fn new(n: usize) -> Self {
+    pub(crate) fn new(n: usize) -> Self {
         Self { edges: Vec::new(), terminals: vec![[0; 2]; n] }
     }
 
@@ -48,7 +48,7 @@ impl CutGraph {
     ///
     /// # Panics
     /// If a node is not there.
-    pub fn add_edge(&mut self, u: usize, v: usize, capacity: u64) {
+    pub(crate) fn add_edge(&mut self, u: usize, v: usize, capacity: u64) {
         let n = self.terminals.len();
         assert!(u < n && v < n, "edge between nodes {u} and {v} of {n}");
         if u != v && capacity > 0 {
@@ -61,7 +61,7 @@ impl CutGraph {
     ///
     /// # Panics
     /// If the node is not there.
-    pub fn add_terminals(&mut self, u: usize, source: u64, sink: u64) {
+    pub(crate) fn add_terminals(&mut self, u: usize, source: u64, sink: u64) {
         for (sum, capacity) in self.terminals[u].iter_mut().zip([source, sink]) {
             *sum = (*sum + capacity.min(Self::MAX_CAPACITY) as i64).min(UNBOUNDED);
         }
@@ -71,7 +71,7 @@ impl CutGraph {
     ///
     /// # Panics
     /// If the node is not there.
-    pub fn fix_to_source(&mut self, u: usize) {
+    pub(crate) fn fix_to_source(&mut self, u: usize) {
         self.terminals[u][0] = UNBOUNDED;
     }
 
@@ -79,7 +79,7 @@ impl CutGraph {
     ///
     /// # Panics
     /// If the node is not there.
-    pub fn fix_to_sink(&mut self, u: usize) {
+    pub(crate) fn fix_to_sink(&mut self, u: usize) {
         self.terminals[u][1] = UNBOUNDED;
     }
 
@@ -89,7 +89,7 @@ impl CutGraph {
     ///
     /// # Errors
     /// [`Cancelled`] if `progress` says so.
-    pub fn min_cut(self, progress: &Progress) -> Result<Vec<bool>, Cancelled> {
+    pub(crate) fn min_cut(self, progress: &Progress) -> Result<Vec<bool>, Cancelled> {
         Ok(self.max_flow(progress)?.1)
     }
 
@@ -98,7 +98,7 @@ impl CutGraph {
     ///
     /// # Errors
     /// [`Cancelled`] if `progress` says so.
-    pub fn max_flow(self, progress: &Progress) -> Result<(u128, Vec<bool>), Cancelled> {
+    pub(crate) fn max_flow(self, progress: &Progress) -> Result<(u128, Vec<bool>), Cancelled> {
         let mut search = Preflow::new(&self);
         search.run(progress)?;
         let side = search.labels_from_goal();

@@ -32,12 +32,12 @@ use crate::geodesics::LandmarkDistances;
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
 
-pub use between::between;
+pub(crate) use between::between;
 pub(crate) use hard_edges::between_hard_edges;
-pub use min_cut::CutGraph;
+pub(crate) use min_cut::CutGraph;
 use polygon_graph::PolygonGraph;
-pub use spectral::SpectralAnalysis;
-pub use straighten::straighten;
+pub(crate) use spectral::SpectralAnalysis;
+pub(crate) use straighten::straighten;
 
 /// Parameters of the segmentation.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,6 +61,7 @@ pub struct SegmentationSettings {
 /// What a cut costs where it runs: α stands for [`SegmentationSettings::crease_share`], the crease is 1 where the surface
 /// is flat and near 0 where it bends, the misfit is 1 in the mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum CutCost {
     /// α·crease + (1 − α)·misfit, as iso-charts has it. A crease then never costs less than the misfit's share, a third
     /// of what a plane does, and cuts leave it for a slightly shorter way.
@@ -98,7 +99,7 @@ impl SegmentationSettings {
 
 /// The parts of a patch.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Segmentation {
+pub(crate) struct Segmentation {
     /// Part of each face; each part is connected.
     pub label: Vec<u32>,
     /// Number of parts.
@@ -114,7 +115,7 @@ pub struct Segmentation {
 ///
 /// # Errors
 /// [`Cancelled`].
-pub fn segment(
+pub(crate) fn segment(
     mesh: &TriMesh,
     polygon: &[u32],
     distances: &LandmarkDistances,
@@ -141,7 +142,7 @@ pub fn segment(
 /// Halves a patch in breadth-first order of its polygons: the split that always works, for patches
 /// that spectral analysis cannot split. O(n).
 #[must_use]
-pub fn bisect(mesh: &TriMesh, polygon: &[u32]) -> Segmentation {
+pub(crate) fn bisect(mesh: &TriMesh, polygon: &[u32]) -> Segmentation {
     let graph = PolygonGraph::new(mesh, polygon);
     let label = grow::halves(&graph);
     finish(&graph, label)

@@ -9,7 +9,7 @@ const KEPT: usize = 10;
 
 /// Classical scaling of the landmark distances of a patch (iso-charts, section 3.1).
 #[derive(Clone, Debug)]
-pub struct SpectralAnalysis {
+pub(crate) struct SpectralAnalysis {
     /// Leading eigenvalues of the centred matrix −½ J D² J, descending, at most ten, positive.
     pub eigenvalues: Vec<f64>,
     /// Number of dimensions the patch needs, at least 2 where there are two eigenvalues.
@@ -26,7 +26,7 @@ impl SpectralAnalysis {
     ///
     /// # Errors
     /// [`Cancelled::OutOfMemory`].
-    pub fn new(distances: &LandmarkDistances) -> Result<Self, Cancelled> {
+    pub(crate) fn new(distances: &LandmarkDistances) -> Result<Self, Cancelled> {
         let squared: Vec<f64> = distances.between_landmarks().into_iter().map(|d| d * d).collect();
         let mds = match classical_mds(&squared, distances.len(), KEPT) {
             Ok(mds) => mds,
@@ -43,7 +43,7 @@ impl SpectralAnalysis {
 
     /// Coordinate `d` of landmark number `l`.
     #[must_use]
-    pub fn coordinate(&self, l: usize, d: usize) -> f64 {
+    pub(crate) fn coordinate(&self, l: usize, d: usize) -> f64 {
         self.coordinates[l * self.eigenvalues.len() + d]
     }
 }

@@ -25,7 +25,7 @@ const TEETH: usize = 2;
 ///
 /// # Errors
 /// [`Cancelled`].
-pub fn straighten(
+pub(crate) fn straighten(
     mesh: &TriMesh,
     polygon: &[u32],
     label: &[u32],

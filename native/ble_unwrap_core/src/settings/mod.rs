@@ -9,14 +9,16 @@ mod table;
 pub use interval::Interval;
 pub use table::{Argument, Function, Group, Kind, NEIGHBOURS, Place, Setting, TABLE, THREADS, Value, listed};
 
+pub use crate::choice::{Choice, Named};
+pub use crate::geodesics::{GeodesicSettings, Metric};
+pub use crate::packing::{PackSettings, Quality, Rotation};
+pub use crate::segmentation::{CutCost, SegmentationSettings};
+pub use crate::stretch::{Solver, StretchSettings};
+
 use crate::choice::choices;
 use crate::embedding::{EmbeddingSettings, Model};
 use crate::error::UnwrapError;
-use crate::geodesics::GeodesicSettings;
 use crate::mesh::ConditionOptions;
-use crate::packing::PackSettings;
-use crate::segmentation::SegmentationSettings;
-use crate::stretch::StretchSettings;
 
 /// Patches of more vertices are embedded by landmarks in the presets of the paper, too. All distances of m vertices
 /// take some 20 m² bytes and 0.4 µs a pair (marching, sweeps): 80 MB and 1.5 s at 2,000, twice the paper's own face of
@@ -31,6 +33,7 @@ pub const NEVER_SEWN: f64 = 1e3;
 
 /// What happens to the holes of a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Holes {
     /// A chart may have several boundary loops.
     Keep,
@@ -45,6 +48,7 @@ choices!(Holes {
 
 /// How charts are scaled relative to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ChartScale {
     /// The same area of texture for the same area of surface.
     Uniform,
@@ -59,6 +63,7 @@ choices!(ChartScale {
 
 /// What the stretch limit bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum LimitOver {
     /// The L2 stretch of every chart.
     Chart,
@@ -74,6 +79,7 @@ choices!(LimitOver {
 
 /// Where the settings that are not given come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Preset {
     /// [`Settings::default`].
     Default,
@@ -103,8 +109,13 @@ pub struct Settings {
     /// vertices of the input is then a seam only if the result says so. Turn it on for data that
     /// repeats vertices along seams of its own, as many file formats do.
     pub weld: bool,
-    /// How near to each other such vertices are, in the unit of the input; `None` for what single precision cannot tell
-    /// apart. See [`ConditionOptions::weld_distance`].
+    /// How near to each other such vertices are, in the unit of the input: 0 for exactly the same coordinates. `None` for
+    /// what single precision cannot tell apart: 2⁻²¹ of the diagonal of the bounding box or, if all coordinates are numbers
+    /// of single precision, of the greatest of them where that is larger; at most a hundredth of the mean side. Nothing
+    /// without `weld`.
+    ///
+    /// A group of vertices lies within the distance around one of them, so chains are broken up. Two vertices of one polygon
+    /// are never welded unless they coincide: no polygon loses a side by it, however long the distance.
     pub weld_distance: Option<f64>,
     /// Whether large components are cut on a coarse mesh first. Off, as in the paper's presets, patches are embedded by all
     /// landmarks and ribbons stay whole, too.
@@ -202,7 +213,7 @@ impl Settings {
 
     /// What a mesh is conditioned with.
     #[must_use]
-    pub fn conditioning(&self) -> ConditionOptions {
+    pub(crate) fn conditioning(&self) -> ConditionOptions {
         ConditionOptions { weld: self.weld, weld_distance: self.weld_distance }
     }
 

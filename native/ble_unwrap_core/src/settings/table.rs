@@ -72,6 +72,7 @@ pub enum Value<'a> {
 /// The functions that take settings, by their names in Python. [`Function::Unwrap`] takes all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "they are documented where they are")]
+#[non_exhaustive]
 pub enum Function {
     Unwrap,
     Analyse,
@@ -123,6 +124,7 @@ impl Function {
 
 /// Settings that the same functions look at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Group {
     /// How a surface is cut into charts.
     Charts,

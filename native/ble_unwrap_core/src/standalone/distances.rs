@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use thiserror::Error;
 
+use crate::error_kind::ErrorKind;
 use crate::geodesics::{DijkstraScratch, FastMarching, MarchScratch, Metric, WeightedGraph, dijkstra};
 use crate::memory;
 use crate::mesh::{self, ConditionOptions, MeshError, MeshInput, Surface, VertexId};
@@ -10,6 +11,7 @@ use crate::progress::{Cancelled, Progress, Stage};
 
 /// Why there are no distances.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum DistancesError {
     /// The input arrays do not make a mesh.
     #[error(transparent)]
@@ -40,13 +42,25 @@ pub enum DistancesError {
     Cancelled(#[from] Cancelled),
 }
 
+impl DistancesError {
+    /// What kind of error this is.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Mesh(error) => error.kind(),
+            Self::Source { .. } | Self::TooLarge { .. } => ErrorKind::Argument,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
 /// Distances along a surface from each of k `sources` to each of its n vertices, row by row (k×n), in the
 /// unit of the input.
 ///
 /// Infinite where the surface does not lead: to other components, to vertices without faces. A source is
 /// at 0 from itself. Vertices at one position count as one. Where the surface touches itself in a single
-/// vertex, paths begin and end on all sides of it, but none passes through. Accuracy: as promised by
-/// [`FastMarching::march`], rounded to single precision. The same for any number of threads.
+/// vertex, paths begin and end on all sides of it, but none passes through. The accuracy is that of the
+/// [`Metric`], rounded to single precision. The same for any number of threads.
 ///
 /// O(n log n) a source: some 0.4 µs a vertex and source by fast marching.
 ///

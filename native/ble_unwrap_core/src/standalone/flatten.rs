@@ -7,6 +7,7 @@ use thiserror::Error;
 use crate::clock::Clock;
 use crate::embedding::{EmbeddingError, Model};
 use crate::error::UnwrapError;
+use crate::error_kind::ErrorKind;
 use crate::flattening::{Rung, Steps};
 use crate::geodesics::{self, LandmarkDistances};
 use crate::mesh::{self, MeshError, MeshInput, Surface, VertexId};
@@ -20,6 +21,7 @@ const NEGLIGIBLE: f64 = 1e-8;
 
 /// Why a patch cannot be flattened by itself. Numbers count from 0, as the arrays do.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum FlattenError {
     /// The input arrays do not make a mesh.
     #[error(transparent)]
@@ -87,12 +89,46 @@ pub enum FlattenError {
     /// The distances have no embedding.
     #[error(transparent)]
     Embedding(EmbeddingError),
-    /// Flips could not be removed, or the stretch not minimised.
-    #[error(transparent)]
-    Stretch(StretchError),
+    /// Every way to a map without flips was defeated by rounding.
+    #[error("no map without flipped triangles was found")]
+    NotInjective,
+    /// A numerical method failed where it should not: a defect of this library. The text says what it met.
+    #[error("{0}")]
+    Internal(String),
     /// The caller asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl FlattenError {
+    /// What kind of error this is.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Mesh(error) => error.kind(),
+            Self::Setting(error) => error.kind(),
+            Self::NoFaces
+            | Self::NoArea
+            | Self::NotFinite { .. }
+            | Self::Pieces { .. }
+            | Self::Closed
+            | Self::Handles { .. }
+            | Self::Pinched { .. }
+            | Self::DoubledEdge { .. }
+            | Self::NotInjective => ErrorKind::Mesh,
+            Self::TooManyLandmarks { .. } => ErrorKind::Argument,
+            // The data are distances of the mesh: what is wrong with them is wrong with it.
+            Self::Embedding(
+                EmbeddingError::TooFewLandmarks { .. }
+                | EmbeddingError::Unreachable { .. }
+                | EmbeddingError::NoExtent
+                | EmbeddingError::Collinear { .. },
+            ) => ErrorKind::Mesh,
+            Self::Embedding(error) => error.kind(),
+            Self::Internal(_) => ErrorKind::Internal,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
 }
 
 impl From<MeshError> for FlattenError {
@@ -115,11 +151,12 @@ impl From<EmbeddingError> for FlattenError {
 
 /// How good a map is.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct MapQuality {
     /// Triangles that are turned over or have no area; exact.
     pub flips: usize,
     /// L2 stretch at the map's best scale, each flipped triangle counted as its mirror image; infinite where one has no
-    /// area. See [`stretch::l2_unsigned`].
+    /// area.
     pub l2: f64,
     /// L-infinity stretch, the worst of any triangle in any direction, at the scale of equal area; likewise.
     pub l_infinity: f64,
@@ -130,6 +167,7 @@ pub struct MapQuality {
 
 /// How a patch was flattened.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct FlattenReport {
     /// The model of the embedding.
     pub model: Model,
@@ -153,7 +191,7 @@ pub struct FlattenReport {
     pub before: MapQuality,
     /// The map returned.
     pub after: MapQuality,
-    /// What took the flips away; see [`Rung::name`](crate::Rung::name).
+    /// What took the flips away: `embedding` if there were none, else `foldover_free`, `tutte_shape` or `tutte_circle`.
     pub rung: &'static str,
     /// Iterations of the stretch minimisation; 0 if it was not asked for.
     pub stretch_iterations: usize,
@@ -165,6 +203,7 @@ pub struct FlattenReport {
 
 /// A patch in the plane, before and after its stretch was minimised.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Flattening {
     /// A position for each vertex of the input as the embedding gave it, in the standard pose and in the unit of the
     /// input; may have flips. NaN for vertices without faces.
@@ -184,8 +223,8 @@ pub struct Flattening {
 /// is simple, too, if it was minimised: where it ran over itself, minimisation is done again from a circle, as in
 /// [`unwrap`](crate::unwrap()). The same for any number of threads. Not guaranteed: a bound on the stretch.
 ///
-/// As costly as the steps: O(k n log n) for the distances from k landmarks, then as
-/// [`embed_chart`](crate::embedding::embed_chart) and [`stretch::minimise_stretch`].
+/// As costly as the steps: O(k n log n) for the distances from k landmarks, O(k³ + sweeps·k² + kn) for the embedding, and a
+/// few dozen sparse linear systems of 2n unknowns for the stretch.
 ///
 /// # Errors
 /// [`FlattenError`] says what is wrong with the patch and what to do.
@@ -313,7 +352,8 @@ fn stretch_error(error: StretchError, surface: &Surface) -> FlattenError {
     match error {
         StretchError::Cancelled(cancelled) => FlattenError::Cancelled(cancelled),
         StretchError::DoubledEdge { a, b } => FlattenError::DoubledEdge { a: of(a), b: of(b) },
-        other => FlattenError::Stretch(other),
+        StretchError::NotInjective => FlattenError::NotInjective,
+        other => FlattenError::Internal(other.to_string()),
     }
 }
 

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use thiserror::Error;
 
+use crate::error_kind::ErrorKind;
 use crate::geodesics::{
     Connectivity, DijkstraScratch, WeightedGraph, connectivity, dijkstra_within, knn_graph, shortest_bridges,
 };
@@ -19,10 +20,12 @@ const SOURCES_AT_ONCE: usize = 256;
 
 /// What becomes of a cloud whose neighbours do not connect it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Connect {
     /// An error, which says how to mend it.
     Error,
-    /// The pieces are joined by the shortest edges ([`shortest_bridges`]).
+    /// The pieces are joined by the shortest edges between them. What leads across such a bridge passes through its two
+    /// ends: distances between the pieces are those of a world in which there is no other way.
     Bridge,
     /// Distances between pieces are infinite.
     Separate,
@@ -49,6 +52,7 @@ impl Default for CloudDistanceSettings {
 
 /// Why there are no distances.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum CloudDistancesError {
     /// The coordinates do not make points.
     #[error("{values} coordinates do not make points of {dimension} coordinates each")]
@@ -96,6 +100,22 @@ pub enum CloudDistancesError {
     /// The caller asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl CloudDistancesError {
+    /// What kind of error this is.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::WrongLength { .. }
+            | Self::NotFinite { .. }
+            | Self::Source { .. }
+            | Self::NoNeighbours
+            | Self::TooLarge { .. }
+            | Self::Disconnected(_) => ErrorKind::Argument,
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
 }
 
 fn others_text(others: usize) -> String {

@@ -3,11 +3,13 @@
 use nalgebra::Point2;
 use thiserror::Error;
 
+use crate::error_kind::ErrorKind;
 use crate::packing::{self, PackError, PackItem, PackSettings, Packed};
 use crate::progress::{Cancelled, Progress, Stage};
 
 /// Why charts cannot be packed.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum RepackError {
     /// Not one chart a triangle.
     #[error("there are {found} chart numbers, but {triangles} triangles; give one a triangle")]
@@ -45,23 +47,46 @@ pub enum RepackError {
     Cancelled(#[from] Cancelled),
 }
 
+impl RepackError {
+    /// What kind of error this is.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::ChartCount { .. } | Self::PointOutOfRange { .. } | Self::SharedPoint { .. } => ErrorKind::Argument,
+            Self::Pack(error) => error.kind(),
+            Self::Cancelled(error) => error.kind(),
+        }
+    }
+}
+
 /// Charts in their new places.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Repacked {
     /// A place in [0, 1]² for each point; (0, 0) for points of no chart.
     pub uv: Vec<[f32; 2]>,
     /// Number of charts.
     pub charts: usize,
-    /// What the packer says of the result.
-    pub packed: Packed,
+    /// Area covered by charts over the area of the texture. A chart that overlaps itself counts its
+    /// triangles' areas, but no more than the texels it touches.
+    pub efficiency: f64,
+    /// The density all charts but specks share, in texels to a unit of the points.
+    pub texels_per_unit: f64,
+    /// Charts scaled up to about a texel, individually.
+    pub specks: usize,
 }
 
 /// Moves, turns and scales charts, all by the same factor, so that they fill the unit square and keep
 /// their margin.
 ///
 /// `triangles` name three of the `points` each; those of one number in `chart` make a chart, connected or
-/// not. Triangles of a negative chart are left out, as are points of no triangle. Guarantees and cost
-/// are those of [`packing::pack`]; the places are then rounded to single precision.
+/// not. Triangles of a negative chart are left out, as are points of no triangle.
+///
+/// Guaranteed, also after rounding to single precision: two different charts are at least the margin apart, every chart lies
+/// within the texture at least half a margin from its border, none is mirrored, and each is at least about a texel large in
+/// its larger extent (unless all its points coincide). The same for any number of threads. Not guaranteed: the greatest
+/// possible density. O(t log t) for t triangles and a bounded number of attempts; on two cores 0.05 to 0.1 s for 2 to 40
+/// charts, 0.2 to 0.3 s for 170.
 ///
 /// # Errors
 /// [`RepackError`]: wrong lengths or indices, a point in two charts, charts that do not fit with their
@@ -107,7 +132,8 @@ pub fn repack(
             uv[from] = [(texel.x / size[0]) as f32, (texel.y / size[1]) as f32];
         }
     }
-    Ok(Repacked { uv, charts: charts.len(), packed })
+    let Packed { efficiency, texels_per_unit, specks, .. } = packed;
+    Ok(Repacked { uv, charts: charts.len(), efficiency, texels_per_unit, specks })
 }
 
 /// One chart with points of its own.

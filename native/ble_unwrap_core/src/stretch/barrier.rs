@@ -12,7 +12,7 @@ use crate::mesh::{HalfedgeId, TriMesh};
 
 /// The barrier usually begins at this share of the boundary edges' lengths: small enough that the boundary of
 /// an undistorted chart does not feel itself round an ordinary corner.
-pub const BOUNDARY_REACH: f64 = 0.25;
+pub(crate) const BOUNDARY_REACH: f64 = 0.25;
 /// Halvings after which a step is given up: 2⁻³⁰ of it moves nothing.
 const MAX_HALVINGS: usize = 30;
 /// A contact counts if it is this near the edge, relative to its length: rounding must not let a
@@ -41,7 +41,7 @@ pub(super) struct Barrier {
 /// Whether the boundary comes nearer to itself somewhere than [`BOUNDARY_REACH`], or touches itself. O(b log b) for b
 /// boundary edges of like length.
 #[must_use]
-pub fn boundary_is_tight(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> bool {
+pub(crate) fn boundary_is_tight(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> bool {
     Barrier::new(mesh, rest, BOUNDARY_REACH).value(uv) > 0.0
 }
 

@@ -22,7 +22,7 @@ const SHARP_DEFECT: f64 = FRAC_PI_6;
 
 /// How a surface bulges.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bulge {
+pub(crate) struct Bulge {
     /// L2 stretch of the conformal map with a free boundary, at its best scale, to first order in the curvature.
     pub l2: f64,
     /// The inner vertex where that map shrinks most; none where it shrinks nowhere, as in planes, rolls and saddles.
@@ -38,7 +38,7 @@ pub struct Bulge {
 ///
 /// # Errors
 /// [`StretchError::Solver`] where the system cannot be factored.
-pub fn bulge(mesh: &TriMesh, rest: &[RestTriangle]) -> Result<Bulge, StretchError> {
+pub(crate) fn bulge(mesh: &TriMesh, rest: &[RestTriangle]) -> Result<Bulge, StretchError> {
     let defect = measure::angle_defects(mesh);
     let is_closed = mesh.halfedges().all(|h| !mesh.is_boundary(h));
     let sharpest =
@@ -69,7 +69,7 @@ pub fn bulge(mesh: &TriMesh, rest: &[RestTriangle]) -> Result<Bulge, StretchErro
 /// The inner vertices of a surface that is flat everywhere else, as of a box, sharpest first; `None` where it is curved at
 /// more than so many of them, or bent inwards. O(n).
 #[must_use]
-pub fn corners(mesh: &TriMesh, most: usize) -> Option<Vec<VertexId>> {
+pub(crate) fn corners(mesh: &TriMesh, most: usize) -> Option<Vec<VertexId>> {
     let defect = measure::angle_defects(mesh);
     let curved = |v: &VertexId| !mesh.is_boundary_vertex(*v) && defect[v.index()].abs() > measure::FLAT_DEFECT;
     let mut corners: Vec<VertexId> = mesh.vertices().filter(curved).take(most + 1).collect();

@@ -27,7 +27,7 @@ pub(super) fn doubled_edge(mesh: &TriMesh) -> Option<[HalfedgeId; 2]> {
 /// A vertex enclosed by two edges that join the same two: on a surface cut from it to the boundary these no longer do.
 /// `None` where nothing is enclosed, as in a slit of one edge, whose sides are such a pair. O(n log n).
 #[must_use]
-pub fn enclosed_vertex(mesh: &TriMesh) -> Option<VertexId> {
+pub(crate) fn enclosed_vertex(mesh: &TriMesh) -> Option<VertexId> {
     doubled_edges(mesh).into_iter().find_map(|edges| {
         let sides = edges.into_iter().flat_map(|h| [h, mesh.twin(h)]).filter(|h| !h.is_none());
         let between = sides.filter_map(|h| enclosed_side(mesh, h.face(), edges)).min_by_key(Vec::len)?;

@@ -24,7 +24,7 @@ const SWEEPS: usize = 30;
 
 /// How a map came to have no flips; each rung of the ladder is tried only if those before it failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Injective {
+pub(crate) enum Injective {
     /// The start had none (or was all mirrored).
     AlreadyWas,
     /// A regularised energy cleared them.
@@ -36,7 +36,7 @@ pub enum Injective {
 }
 
 /// A point a vertex, without flips, and how they were got.
-pub type InjectiveMap = (Vec<Point2<f64>>, Injective);
+pub(crate) type InjectiveMap = (Vec<Point2<f64>>, Injective);
 
 /// A map near `start` (a point a vertex, in about surface units) with all triangles strictly positive by an exact test, and how
 /// it was got.
@@ -50,7 +50,7 @@ pub type InjectiveMap = (Vec<Point2<f64>>, Injective);
 ///
 /// # Panics
 /// If there is not one rest triangle a face and one point a vertex.
-pub fn make_injective(
+pub(crate) fn make_injective(
     mesh: &TriMesh,
     rest: &[RestTriangle],
     start: &[Point2<f64>],
@@ -86,7 +86,7 @@ pub fn make_injective(
 ///
 /// # Errors
 /// [`StretchError::Solver`], [`StretchError::Cancelled`].
-pub fn clear_flips(
+pub(crate) fn clear_flips(
     mesh: &TriMesh,
     rest: &[RestTriangle],
     start: &[Point2<f64>],
@@ -120,7 +120,7 @@ pub fn clear_flips(
 ///
 /// # Errors
 /// [`StretchError::Solver`], [`StretchError::Cancelled`].
-pub fn clear_locally(
+pub(crate) fn clear_locally(
     mesh: &TriMesh,
     rest: &[RestTriangle],
     start: &[Point2<f64>],

@@ -9,13 +9,13 @@ use crate::mesh::TriMesh;
 
 /// Total area on the surface, of the rest triangles.
 #[must_use]
-pub fn surface_area(rest: &[RestTriangle]) -> f64 {
+pub(crate) fn surface_area(rest: &[RestTriangle]) -> f64 {
     rest.iter().map(RestTriangle::area).sum()
 }
 
 /// Total signed area in the plane.
 #[must_use]
-pub fn plane_area(mesh: &TriMesh, uv: &[Point2<f64>]) -> f64 {
+pub(crate) fn plane_area(mesh: &TriMesh, uv: &[Point2<f64>]) -> f64 {
     mesh.triangles()
         .iter()
         .map(|t| {
@@ -32,7 +32,7 @@ pub fn plane_area(mesh: &TriMesh, uv: &[Point2<f64>]) -> f64 {
 /// # Panics
 /// If there is not one rest triangle a face and one point a vertex.
 #[must_use]
-pub fn l2_stretch(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
+pub(crate) fn l2_stretch(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
     assert_eq!(
         (rest.len(), uv.len()),
         (mesh.face_count(), mesh.vertex_count()),
@@ -55,7 +55,7 @@ pub fn l2_stretch(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> 
 /// # Panics
 /// If there is not one point a vertex.
 #[must_use]
-pub fn l2_of_positions(mesh: &TriMesh, uv: &[Point2<f64>], negligible: f64) -> f64 {
+pub(crate) fn l2_of_positions(mesh: &TriMesh, uv: &[Point2<f64>], negligible: f64) -> f64 {
     let sums = Sums::of_positions(mesh, uv, negligible);
     (sums.energy * sums.plane).sqrt() / sums.surface
 }
@@ -69,7 +69,7 @@ pub fn l2_of_positions(mesh: &TriMesh, uv: &[Point2<f64>], negligible: f64) -> f
 /// # Panics
 /// If there is not one point a vertex.
 #[must_use]
-pub fn l2_unsigned(mesh: &TriMesh, uv: &[Point2<f64>], negligible: f64) -> f64 {
+pub(crate) fn l2_unsigned(mesh: &TriMesh, uv: &[Point2<f64>], negligible: f64) -> f64 {
     let sums = Sums::of_positions(mesh, uv, negligible);
     let l2 = (sums.energy * sums.plane_unsigned).sqrt() / sums.surface;
     // A face whose first edge has no length divides nothing by nothing.
@@ -120,7 +120,7 @@ impl Sums {
 /// # Panics
 /// If there is not one rest triangle a face and one point a vertex.
 #[must_use]
-pub fn linf_stretch(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
+pub(crate) fn linf_stretch(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
     assert_eq!(
         (rest.len(), uv.len()),
         (mesh.face_count(), mesh.vertex_count()),
@@ -137,7 +137,7 @@ pub fn linf_stretch(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -
 
 /// Scales `uv` so that the chart covers the area of its surface; leaves it alone where its signed area
 /// is not positive. Rounding may flip a triangle of almost no area: check afterwards. O(n).
-pub fn rescale_to_equal_area(mesh: &TriMesh, rest: &[RestTriangle], uv: &mut [Point2<f64>]) {
+pub(crate) fn rescale_to_equal_area(mesh: &TriMesh, rest: &[RestTriangle], uv: &mut [Point2<f64>]) {
     let scale = (surface_area(rest) / plane_area(mesh, uv)).sqrt();
     if scale.is_finite() && scale > 0.0 {
         for p in uv {

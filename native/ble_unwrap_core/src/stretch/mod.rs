@@ -43,19 +43,17 @@ mod unbend;
 use nalgebra::Point2;
 use thiserror::Error;
 
-pub use barrier::{BOUNDARY_REACH, boundary_is_tight};
-pub use bulge::{Bulge, bulge, corners};
-pub use doubled_edge::enclosed_vertex;
-pub use injective::{Injective, InjectiveMap, clear_flips, clear_locally, make_injective};
-pub use measure::{
-    l2_of_positions, l2_stretch, l2_unsigned, linf_stretch, plane_area, rescale_to_equal_area, surface_area,
-};
-pub use overlap::{BoundaryDefect, boundary_defect, boundary_is_simple, first_flip};
-pub use part_boundary::{boundary_is_tangled, part_boundary};
-pub use peaks::lower_peaks;
-pub use stitch::stitch;
-pub use tutte::{TutteBoundary, tutte_embedding};
-pub use unbend::{Unbent, unbend};
+pub(crate) use barrier::{BOUNDARY_REACH, boundary_is_tight};
+pub(crate) use bulge::{Bulge, bulge, corners};
+pub(crate) use doubled_edge::enclosed_vertex;
+pub(crate) use injective::{Injective, clear_flips, clear_locally, make_injective};
+pub(crate) use measure::{l2_of_positions, l2_stretch, l2_unsigned, linf_stretch, plane_area, surface_area};
+pub(crate) use overlap::{boundary_is_simple, first_flip};
+pub(crate) use part_boundary::{boundary_is_tangled, part_boundary};
+pub(crate) use peaks::lower_peaks;
+pub(crate) use stitch::stitch;
+pub(crate) use tutte::{TutteBoundary, tutte_embedding};
+pub(crate) use unbend::unbend;
 
 use crate::choice::choices;
 use crate::distortion::RestTriangle;
@@ -65,6 +63,7 @@ use crate::progress::{Cancelled, Progress};
 
 /// How stretch is minimised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Solver {
     /// Projected Newton on all vertices at once.
     Newton,
@@ -77,7 +76,7 @@ choices!(Solver {
     LineSearch: "line_search", "Line Search", "One vertex at a time along random directions, as in the paper.";
 });
 
-/// Settings of [`minimise_stretch`].
+/// How stretch is minimised.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StretchSettings {
     /// The method.
@@ -109,7 +108,7 @@ impl StretchSettings {
 
 /// What one call of [`minimise_stretch`] may be asked beyond the settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MinimiseOptions {
+pub(crate) struct MinimiseOptions {
     /// Give up as soon as the chart's L2 stretch is clearly not going to come under this.
     pub abandon_above: Option<f64>,
     /// Keep the boundary from touching itself; the start must be simple. It begins to feel itself at this share of its
@@ -121,7 +120,7 @@ pub struct MinimiseOptions {
 
 /// What [`minimise_stretch`] found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Minimised {
+pub(crate) struct Minimised {
     /// A point a vertex, scaled to the area of the surface.
     pub uv: Vec<Point2<f64>>,
     /// L2 stretch at the chart's own best scale; at least 1.
@@ -142,7 +141,7 @@ pub struct Minimised {
 
 /// Why a chart has no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum StretchError {
+pub(crate) enum StretchError {
     /// The computation was asked to stop, or is out of memory.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -199,7 +198,7 @@ impl From<SparseError> for StretchError {
 ///
 /// # Panics
 /// If there is not one rest triangle a face and one point a vertex.
-pub fn minimise_stretch(
+pub(crate) fn minimise_stretch(
     mesh: &TriMesh,
     rest: &[RestTriangle],
     start: &[Point2<f64>],

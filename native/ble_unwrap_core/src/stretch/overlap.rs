@@ -9,7 +9,7 @@ use crate::predicates::orientation;
 /// The first face whose triangle is not strictly positive by an exact test, or has a coordinate that
 /// is not finite; `None` if all are positive. O(n).
 #[must_use]
-pub fn first_flip(mesh: &TriMesh, uv: &[Point2<f64>]) -> Option<FaceId> {
+pub(crate) fn first_flip(mesh: &TriMesh, uv: &[Point2<f64>]) -> Option<FaceId> {
     mesh.faces().find(|&f| {
         let [a, b, c] = mesh.triangle(f).map(|v| uv[v.index()]);
         let finite = [a, b, c].iter().all(|p| p.x.is_finite() && p.y.is_finite());
@@ -19,7 +19,7 @@ pub fn first_flip(mesh: &TriMesh, uv: &[Point2<f64>]) -> Option<FaceId> {
 
 /// What keeps the boundary of a chart from being simple.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BoundaryDefect {
+pub(crate) enum BoundaryDefect {
     /// Two boundary edges meet elsewhere than at a common vertex, or fold onto each other there.
     Crossing(HalfedgeId, HalfedgeId),
     /// Not exactly one loop runs counter-clockwise: a hole is turned inside out, or all loops are.
@@ -37,13 +37,13 @@ pub enum BoundaryDefect {
 ///
 /// O(b) for b boundary edges of like length; long edges cost their length in grid cells.
 #[must_use]
-pub fn boundary_is_simple(mesh: &TriMesh, uv: &[Point2<f64>]) -> bool {
+pub(crate) fn boundary_is_simple(mesh: &TriMesh, uv: &[Point2<f64>]) -> bool {
     boundary_defect(mesh, uv).is_none()
 }
 
 /// What [`boundary_is_simple`] finds first, in a fixed order, or `None`.
 #[must_use]
-pub fn boundary_defect(mesh: &TriMesh, uv: &[Point2<f64>]) -> Option<BoundaryDefect> {
+pub(crate) fn boundary_defect(mesh: &TriMesh, uv: &[Point2<f64>]) -> Option<BoundaryDefect> {
     let mut first = None;
     let finite = visit_crossings(mesh, uv, |g, h| {
         first = Some(BoundaryDefect::Crossing(g, h));

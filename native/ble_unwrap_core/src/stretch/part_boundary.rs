@@ -29,7 +29,7 @@ const SWEEPS: usize = 4;
 ///
 /// # Errors
 /// [`StretchError::Solver`], [`StretchError::Cancelled`].
-pub fn part_boundary(
+pub(crate) fn part_boundary(
     mesh: &TriMesh,
     rest: &[RestTriangle],
     start: &[Point2<f64>],
@@ -63,7 +63,7 @@ pub fn part_boundary(
 
 /// Whether the boundary of a map crosses itself in more places than [`part_boundary`] tries to part. O(n log n).
 #[must_use]
-pub fn boundary_is_tangled(mesh: &TriMesh, uv: &[Point2<f64>]) -> bool {
+pub(crate) fn boundary_is_tangled(mesh: &TriMesh, uv: &[Point2<f64>]) -> bool {
     is_too_many(mesh, boundary_crossings(mesh, uv).len())
 }
 

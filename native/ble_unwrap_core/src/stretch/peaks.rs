@@ -41,7 +41,7 @@ const HALVES_WEIGHT: f64 = 0.01;
 ///
 /// # Panics
 /// If there is not one rest triangle a face and one point a vertex.
-pub fn lower_peaks(
+pub(crate) fn lower_peaks(
     mesh: &TriMesh,
     rest: &[RestTriangle],
     quads: &[Quad],

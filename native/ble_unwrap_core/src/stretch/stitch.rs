@@ -17,7 +17,7 @@ use crate::mesh::TriMesh;
 ///
 /// # Errors
 /// [`StretchError::Solver`] where the system cannot be factored.
-pub fn stitch(
+pub(crate) fn stitch(
     mesh: &TriMesh,
     rest: &[RestTriangle],
     drawn: &[[Point2<f64>; 3]],

@@ -18,7 +18,7 @@ use crate::progress::Progress;
 
 /// Where the outer boundary loop, the longest, goes.
 #[derive(Clone, Copy, Debug)]
-pub enum TutteBoundary<'a> {
+pub(crate) enum TutteBoundary<'a> {
     /// On a circle with the area of the surface, spaced by length.
     Circle,
     /// On a strictly convex polygon after the outer loop of this map (a point a vertex).
@@ -46,7 +46,7 @@ const SPREADING_LIMIT: f64 = 1e3;
 /// # Errors
 /// [`StretchError::DoubledEdge`] where two edges join the same two vertices, which no map with straight
 /// edges can tell apart; [`StretchError::Solver`]; [`StretchError::Cancelled`].
-pub fn tutte_embedding(
+pub(crate) fn tutte_embedding(
     mesh: &TriMesh,
     rest: &[RestTriangle],
     boundary: TutteBoundary,

@@ -32,7 +32,7 @@ const ALWAYS_FEW: f64 = 50.0;
 
 /// A map whose quads are less bent.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Unbent {
+pub(crate) struct Unbent {
     /// A point a vertex.
     pub uv: Vec<Point2<f64>>,
     /// Convex quads that are bent still.
@@ -51,7 +51,7 @@ pub struct Unbent {
 ///
 /// # Panics
 /// If there is not one rest triangle a face and one point a vertex.
-pub fn unbend(
+pub(crate) fn unbend(
     mesh: &TriMesh,
     rest: &[RestTriangle],
     quads: &[Quad],

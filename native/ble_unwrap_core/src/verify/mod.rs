@@ -69,6 +69,7 @@ impl<T: Copy + Ord> Defect<T> {
 
 /// The outcome of the exact checks.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Certificate {
     /// Charts: different non-negative labels.
     pub charts: usize,
@@ -156,20 +157,15 @@ impl Certificate {
 
 /// Checks a layout exactly; the module's text tells what is proven.
 ///
-/// Charts are the labels of `mesh`. `reversed` is true for triangles that the library turned against
-/// the input's winding, empty if it turned none. A false [`Certificate::complete`] needs tens of
-/// millions of near misses or contacts.
+/// Charts are the labels of `mesh`. A false [`Certificate::complete`] needs tens of millions of near
+/// misses or contacts.
 ///
 /// Deterministic for any number of threads. O(n log n); less than a second for a million triangles.
 ///
 /// # Errors
 /// [`Cancelled`].
-///
-/// # Panics
-/// If `reversed` is neither empty nor as long as the triangles.
-pub fn verify(mesh: &UvMesh, reversed: &[bool], progress: &Progress) -> Result<Certificate, Cancelled> {
+pub(crate) fn verify(mesh: &UvMesh, progress: &Progress) -> Result<Certificate, Cancelled> {
     let m = mesh.triangle_count();
-    assert!(reversed.is_empty() || reversed.len() == m, "one orientation a triangle");
     let mut out = Certificate { complete: true, ..Certificate::default() };
     let mut labels: Vec<i32> = (0..m).map(|f| mesh.label(f)).filter(|&l| l >= 0).collect();
     labels.sort_unstable();
@@ -177,7 +173,7 @@ pub fn verify(mesh: &UvMesh, reversed: &[bool], progress: &Progress) -> Result<C
     out.charts = labels.len();
     let mut faulty = vec![false; labels.len()];
 
-    // The triangles with a chart and finite UVs, turned as the library has them.
+    // The triangles with a chart and finite UVs.
     let mut corners: Vec<[Point; 3]> = Vec::with_capacity(m);
     let mut source: Vec<u32> = Vec::with_capacity(m);
     let mut chart: Vec<u32> = Vec::with_capacity(m);
@@ -192,8 +188,6 @@ pub fn verify(mesh: &UvMesh, reversed: &[bool], progress: &Progress) -> Result<C
             out.out_of_range.add(f as u32);
             faulty[c] = true;
         }
-        let turned = reversed.get(f).copied().unwrap_or(false);
-        let uv = if turned { [uv[0], uv[2], uv[1]] } else { uv };
         let finite = uv.iter().flatten().all(|x| x.is_finite());
         if !finite || orientation(uv[0], uv[1], uv[2]) <= 0 {
             out.flipped.add(f as u32);

@@ -22,7 +22,7 @@ use collapse::Collapsing;
 /// Not guaranteed: that no two of its faces intersect; that a coarse face has any fine face; that
 /// the fine faces of a connected set of coarse faces are connected (nearly always they are).
 #[derive(Clone, Debug, Default)]
-pub struct Coarse {
+pub(crate) struct Coarse {
     /// The coarse mesh.
     pub mesh: TriMesh,
     /// For each fine vertex the coarse vertex it collapsed into.
@@ -32,10 +32,6 @@ pub struct Coarse {
     /// For each fine face the coarse face it lies on: the one nearest to its centroid among those at
     /// the coarse vertices its corners collapsed into.
     pub face: Vec<FaceId>,
-    /// The coarse vertices by falling importance for the shape: those that could not be removed at
-    /// all (in order of number), then the others from the last removed, when the collapse goes on,
-    /// to the first.
-    pub importance: Vec<VertexId>,
 }
 
 /// Coarsens a mesh to `target_vertices`, or to as few as can be if that is more.
@@ -53,7 +49,7 @@ pub struct Coarse {
 ///
 /// # Errors
 /// [`Cancelled`] soon after a cancel: at most a few passes over the arrays run unwatched.
-pub fn coarsen(mesh: &TriMesh, target_vertices: usize, progress: &Progress) -> Result<Coarse, Cancelled> {
+pub(crate) fn coarsen(mesh: &TriMesh, target_vertices: usize, progress: &Progress) -> Result<Coarse, Cancelled> {
     let mut collapsing = Collapsing::new(mesh, progress)?;
     collapsing.run(target_vertices, progress)?;
     let (coarse, source) = collapsing.mesh(mesh);
@@ -64,14 +60,7 @@ pub fn coarsen(mesh: &TriMesh, target_vertices: usize, progress: &Progress) -> R
     let vertex: Vec<VertexId> = collapsing.roots().iter().map(|root| number[root.index()]).collect();
     let coarse = guides::carried_over(mesh, coarse, &vertex);
     let face = nearest_or_same(mesh, &coarse, &vertex, collapsing.removed().is_empty(), progress)?;
-
-    let before = collapsing.removed().len();
-    collapsing.run(0, progress)?;
-    let later: Vec<VertexId> = collapsing.removed()[before..].iter().rev().map(|v| number[v.index()]).collect();
-    let mut is_later = vec![false; source.len()];
-    later.iter().for_each(|v| is_later[v.index()] = true);
-    let importance = coarse.vertices().filter(|v| !is_later[v.index()]).chain(later.iter().copied()).collect();
-    Ok(Coarse { mesh: coarse, vertex, source, face, importance })
+    Ok(Coarse { mesh: coarse, vertex, source, face })
 }
 
 /// The coarse face of each fine face; nothing to search where nothing was removed.

@@ -1,7 +1,8 @@
 //! Conditioning of the catalogue's meshes and of whatever index arrays can hold.
 
-use ble_unwrap_core::Progress;
-use ble_unwrap_core::mesh::{ConditionOptions, FaceId, HalfedgeId, MeshError, MeshInput, Surface, condition, measure};
+use super::defects::Defects;
+use super::{ConditionOptions, FaceId, HalfedgeId, MeshError, MeshInput, Surface, condition, measure};
+use crate::progress::Progress;
 use ble_unwrap_fixtures::{
     Case, FlatPolygons, PolyMesh, book, catalogue, cylinder, grid, ico_sphere, keyhole, moebius, regular_polygon,
     sculpt_like, soup, torus,
@@ -18,12 +19,26 @@ fn check(input: &MeshInput<'_>, surface: &Surface) -> Result<(), String> {
     mesh.check_invariants()?;
     let vertex = |corner: u32| input.corner_vertices[corner as usize] as usize;
     let point = |corner: u32| surface.representative[vertex(corner)];
+    let mut follows = vec![false; input.corner_vertices.len()];
+    surface.followers.iter().for_each(|f| follows[f[0] as usize] = true);
     let mut seen = vec![false; input.corner_vertices.len()];
     let mut triangles = vec![0; input.face_offsets.len().saturating_sub(1)];
     for f in mesh.faces() {
         let polygon = surface.polygon[f.index()] as usize;
         let corners = input.face_offsets[polygon] as u32..input.face_offsets[polygon + 1] as u32;
         triangles[polygon] += 1;
+        // Nothing but corners that lie on others is between the ends of a side.
+        let is_side = |a: u32, b: u32| {
+            let after = |c: u32| if c + 1 == corners.end { corners.start } else { c + 1 };
+            let leads = |from: u32, to: u32| {
+                let mut c = after(from);
+                while c != to && follows[c as usize] {
+                    c = after(c);
+                }
+                c == to
+            };
+            leads(a, b) || leads(b, a)
+        };
         for h in f.halfedges() {
             let corner = surface.corner[h.index()];
             if !corners.contains(&corner) {
@@ -40,7 +55,7 @@ fn check(input: &MeshInput<'_>, surface: &Surface) -> Result<(), String> {
             }
             let twin = mesh.twin(h);
             let same_polygon = !twin.is_none() && surface.polygon[twin.face().index()] as usize == polygon;
-            if same_polygon != surface.is_diagonal(h) {
+            if same_polygon == is_side(corner, surface.corner[h.next().index()]) {
                 return Err(format!("{h} of face {polygon}: glued to its own face is {same_polygon}"));
             }
         }
@@ -163,7 +178,7 @@ fn coordinates_of_any_size_are_scaled_to_unit_area() {
     for size in [1e-300, 1e-30, 1e30, 1e300] {
         let surface = conditioned(&mesh.clone().moved(|p| p.map(|x| size * x)), "torus");
         assert!((measure::total_area(&surface.mesh) - 1.0).abs() < 1e-12, "size {size}");
-        assert!(surface.defects.is_empty() && surface.scale > size && surface.scale < 10.0 * size);
+        assert!(surface.defects == Defects::default() && surface.scale > size && surface.scale < 10.0 * size);
     }
 }
 
@@ -175,12 +190,12 @@ fn windings_are_made_to_agree_with_most_of_the_area() {
     assert!(mixed.mesh.faces().all(|f| measure::area_vector(mixed.mesh.triangle_positions(f)).z > 0.0));
     let mostly_down = conditioned(&plane.flipped(|f| f % 3 != 0), "mostly down");
     assert!(mostly_down.mesh.faces().all(|f| measure::area_vector(mostly_down.mesh.triangle_positions(f)).z < 0.0));
-    assert!(
-        mostly_down
-            .mesh
-            .faces()
-            .all(|f| mostly_down.reversed[f.index()] == mostly_down.polygon[f.index()].is_multiple_of(3))
-    );
+    // The corners of a polygon ascend along its winding.
+    let is_reversed = |f: FaceId| {
+        let [a, b, c] = f.halfedges().map(|h| mostly_down.corner[h.index()]);
+        [a < b, b < c, c < a].into_iter().filter(|rises| *rises).count() == 1
+    };
+    assert!(mostly_down.mesh.faces().all(|f| is_reversed(f) == mostly_down.polygon[f.index()].is_multiple_of(3)));
 }
 
 #[test]
@@ -428,8 +443,9 @@ proptest! {
             Ok(surface) => {
                 prop_assert_eq!(check(&input, &surface), Ok(()));
                 let mesh = &surface.mesh;
+                let polygon = |h: HalfedgeId| surface.polygon[h.face().index()];
                 let vertex = |h: HalfedgeId| input.corner_vertices[surface.corner[h.index()] as usize];
-                for h in mesh.halfedges().filter(|&h| !mesh.is_boundary(h) && !surface.is_diagonal(h)) {
+                for h in mesh.halfedges().filter(|&h| !mesh.is_boundary(h) && polygon(h) != polygon(mesh.twin(h))) {
                     let ends = [vertex(h), vertex(h.next())];
                     prop_assert!(!seams.iter().any(|s| *s == ends || [s[1], s[0]] == ends), "a seam was glued");
                 }
