@@ -139,7 +139,7 @@ fn a_vertex_wound_around_twice_is_found() {
 }
 
 #[test]
-fn flips_are_exact_and_turned_triangles_are_not_flips() {
+fn flips_are_exact() {
     let x = 0.3f32;
     let mut soup = Soup::default();
     // Collinear in float32, and one bit to each side.
