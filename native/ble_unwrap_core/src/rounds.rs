@@ -47,7 +47,7 @@ where
     let mut rounds = Rounds { made: Vec::new(), notes: Vec::new(), divisions: 0 };
     while !open.is_empty() {
         open.sort_by_key(|(piece, _)| key(piece));
-        let steps: Vec<Result<(Outcome<M, P>, N), Cancelled>> =
+        let steps: Vec<Result<_, Cancelled>> =
             open.par_iter().with_max_len(1).map_init(&scratch, |scratch, (piece, _)| step(piece, scratch)).collect();
         let mut next = Vec::new();
         for ((_, division), taken) in open.iter().zip(steps) {

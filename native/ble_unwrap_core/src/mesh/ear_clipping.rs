@@ -137,7 +137,7 @@ impl<'a> Clipper<'a> {
         self.tests += self.reflex.len();
         !self.reflex.iter().any(|&r| {
             let p = self.flat[r as usize];
-            let corner_of_ear = ear.contains(&(r as usize)) || [a, b, c].iter().any(|q| p == *q);
+            let corner_of_ear = ear.contains(&(r as usize)) || [a, b, c].contains(&p);
             !corner_of_ear && orientation(a, b, p) >= 0.0 && orientation(b, c, p) >= 0.0 && orientation(c, a, p) >= 0.0
         })
     }
