@@ -318,8 +318,8 @@ fn parallel<B: Blocks, C: Curvature>(
 mod tests {
     use super::super::affinity::{Kernel, KernelWidth, model_affinity};
     use super::super::flat_shapes::{misfit, rectangle};
-    use super::super::random::normal;
     use super::*;
+    use crate::random::normal;
 
     fn options(model: LogitModel, update: Update, relaxation: f64) -> FitOptions {
         FitOptions { model, update, relaxation, max_sweeps: 30, tolerance: 0.0 }

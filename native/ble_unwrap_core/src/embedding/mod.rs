@@ -35,7 +35,6 @@ mod isomap;
 mod landmark_regression;
 mod logistic;
 mod placement;
-mod random;
 mod settings;
 mod source;
 mod square_matrix;
