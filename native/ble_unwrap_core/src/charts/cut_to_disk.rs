@@ -10,7 +10,7 @@
 //! A boundary loop counts as one single vertex here, for to cross a hole costs nothing: so cuts may end
 //! on boundaries, and the decomposition is that of a closed surface.
 
-use crate::geodesics::MinHeap;
+use crate::collections::{DisjointSets, MinHeap};
 use crate::mesh::{FaceId, Groups, HalfedgeId, TriMesh, VertexId};
 
 /// At most so many bases are tried for the shortest cut,
@@ -415,33 +415,6 @@ fn farthest(distance: &[f64]) -> usize {
         }
     }
     best
-}
-
-/// Sets that are joined, never parted.
-struct DisjointSets {
-    parent: Vec<u32>,
-}
-
-impl DisjointSets {
-    fn new(n: usize) -> Self {
-        Self { parent: (0..n as u32).collect() }
-    }
-
-    fn root(&mut self, mut i: usize) -> usize {
-        while self.parent[i] as usize != i {
-            let up = self.parent[i] as usize;
-            self.parent[i] = self.parent[up];
-            i = self.parent[i] as usize;
-        }
-        i
-    }
-
-    /// Joins the sets of two members; false if they were one already.
-    fn join(&mut self, a: usize, b: usize) -> bool {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parent[a.max(b)] = a.min(b) as u32;
-        a != b
-    }
 }
 
 #[cfg(test)]

@@ -7,7 +7,8 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::geodesics::{MinHeap, WeightedGraph};
+use crate::collections::MinHeap;
+use crate::geodesics::WeightedGraph;
 use crate::progress::{Cancelled, Progress};
 
 use super::sample::Sample;

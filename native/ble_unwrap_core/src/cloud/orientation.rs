@@ -6,7 +6,8 @@
 
 use nalgebra::Vector3;
 
-use crate::geodesics::{MinHeap, WeightedGraph};
+use crate::collections::MinHeap;
+use crate::geodesics::WeightedGraph;
 
 /// Turns unit normals to one side, as far as the surface has two. Prim's minimum spanning tree with the cost
 /// 1 − |n·n′|, from the lowest node of each component; O(m log n).

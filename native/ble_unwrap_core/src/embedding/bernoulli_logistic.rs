@@ -320,8 +320,8 @@ mod tests {
     use super::super::affinity::{Kernel, KernelWidth};
     use super::super::flat_shapes::{misfit, rectangle};
     use super::super::logistic::logistic;
-    use super::super::random::normal;
     use super::*;
+    use crate::random::normal;
 
     fn options(model: LogitModel, update: Update, relaxation: f64) -> FitOptions {
         FitOptions { model, update, relaxation, max_sweeps: 30, tolerance: 0.0 }

@@ -238,8 +238,8 @@ pub(super) fn solve(matrix: &mut [f64], m: usize, right: &[f64], solution: &mut 
 #[cfg(test)]
 mod tests {
     use super::super::logistic::{Exact, Quarter, Tight};
-    use super::super::random::normal;
     use super::*;
+    use crate::random::normal;
 
     /// A random problem: affinities, n×q coordinates, intercepts (empty for the printed model).
     fn problem(n: usize, q: usize, with: bool, seed: u64) -> (Affinity, Vec<f64>, Vec<f64>) {

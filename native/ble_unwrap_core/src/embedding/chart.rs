@@ -7,13 +7,13 @@ use crate::geodesics::LandmarkDistances;
 use crate::linalg::{Mds, leading_mds};
 use crate::mesh::VertexId;
 use crate::progress::Progress;
+use crate::random::normal;
 
 use super::affinity::{Affinity, KernelWidth, kernel_width};
 use super::bernoulli_logistic::fit;
 use super::error::EmbeddingError;
 use super::isomap;
 use super::landmark_regression::LandmarkModel;
-use super::random::normal;
 use super::settings::{EmbeddingSettings, Initial, Model};
 
 /// Least extent along the second principal axis over the first: distances are kept to 6e-8, and the second

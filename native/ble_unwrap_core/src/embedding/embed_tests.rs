@@ -9,10 +9,10 @@ use super::embedded::Embedding;
 use super::error::EmbeddingError;
 use super::flat_shapes::{disc, ell, misfit, rectangle};
 use super::input::{EmbedInput, PointMetric};
-use super::random::normal;
 use super::settings::{EmbeddingSettings, Initial, Model};
 use crate::linalg::classical_mds;
 use crate::progress::Progress;
+use crate::random::normal;
 
 const GEODESIC: PointMetric = PointMetric::Geodesic { neighbours: 8 };
 

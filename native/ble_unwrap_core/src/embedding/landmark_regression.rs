@@ -496,8 +496,8 @@ impl LandmarkModel {
 
 #[cfg(test)]
 mod tests {
-    use super::super::random::normal;
     use super::*;
+    use crate::random::normal;
 
     #[test]
     fn planar_and_general_place_alike() {

@@ -2,10 +2,10 @@
 
 use super::affinity::Kernel;
 use super::landmark_regression::{Evidence, LandmarkModel};
-use super::random::normal;
 use crate::geodesics::LandmarkDistances;
 use crate::mesh::VertexId;
 use crate::progress::Progress;
+use crate::random::normal;
 
 /// k landmarks of q dimensions with exact parameters of the model with intercepts, σ = 1.
 fn exact(k: usize, q: usize) -> (LandmarkModel, Vec<Vec<f64>>) {

@@ -8,8 +8,8 @@ use super::affinity::{Affinity, Kernel, KernelWidth};
 use super::bernoulli_logistic::{Fit, FitOptions, LogitModel, Update, fit};
 use super::blocks::{Blocks, General};
 use super::logistic::Quarter;
-use super::random::normal;
 use crate::progress::Progress;
+use crate::random::normal;
 
 /// Affinities of all ordered pairs, not symmetric, and q-dimensional points of the printed model.
 #[derive(Clone)]

@@ -28,7 +28,6 @@ mod isomap;
 mod landmark_regression;
 mod logistic;
 mod placement;
-mod random;
 mod settings;
 mod source;
 mod square_matrix;

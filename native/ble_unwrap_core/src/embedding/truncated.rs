@@ -112,9 +112,9 @@ pub(super) fn between_points(
 #[cfg(test)]
 mod tests {
     use super::super::affinity::KernelWidth;
-    use super::super::random::normal;
     use super::*;
     use crate::geodesics::{graph_distances, knn_graph};
+    use crate::random::normal;
 
     fn same(a: &Affinity, b: &Affinity) -> bool {
         let off_diagonal =

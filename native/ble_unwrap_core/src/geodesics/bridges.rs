@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::kd_tree::{KdTree, Pair};
 use super::knn_graph::Places;
 use super::weighted_graph::WeightedGraph;
-use crate::mesh::DisjointSets;
+use crate::collections::DisjointSets;
 use crate::progress::{Cancelled, Progress};
 
 /// Points searched between two looks at the cancel flag, and at least so many a task.

@@ -5,7 +5,7 @@ use std::fmt;
 use super::kd_tree::KdTree;
 use super::knn_graph::{Places, search_each};
 use super::weighted_graph::WeightedGraph;
-use crate::mesh::DisjointSets;
+use crate::collections::DisjointSets;
 use crate::progress::{Cancelled, Progress};
 
 /// Where the search for a number of neighbours that connects begins; doubled until one does.

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::min_heap::MinHeap;
 use super::weighted_graph::WeightedGraph;
+use crate::collections::MinHeap;
 use crate::progress::{Cancelled, Progress};
 
 /// Nodes settled between two looks at the cancel flag.

@@ -1,8 +1,8 @@
 //! Landmarks of a graph.
 
 use super::dijkstra::add_source;
-use super::min_heap::MinHeap;
 use super::weighted_graph::WeightedGraph;
+use crate::collections::MinHeap;
 use crate::progress::{Cancelled, Progress};
 
 /// At most `count` nodes of a graph, all different, each as far along edges from all before it as any node, beginning

@@ -14,7 +14,7 @@
 
 use nalgebra::{Point2, Point3, Vector2};
 
-use super::min_heap::MinHeap;
+use crate::collections::MinHeap;
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 use crate::progress::{Cancelled, Progress};
 

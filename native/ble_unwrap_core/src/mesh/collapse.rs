@@ -10,8 +10,8 @@ use std::collections::HashMap;
 
 use nalgebra::Point3;
 
-use super::disjoint_sets::DisjointSets;
 use super::input::Polygons;
+use crate::collections::DisjointSets;
 
 /// Longest side of no length, as a share of the diagonal of the bounding box: a triangle of such a height counts as
 /// degenerate in the measures, since single precision resolves no less.

@@ -6,6 +6,7 @@ use super::defects::Defects;
 use super::index::VertexId;
 use super::input::Polygons;
 use super::tri_mesh::TriMesh;
+use crate::random::word;
 
 /// Vertices that are one with an earlier one.
 pub(super) fn count_welded(representative: &[u32], defects: &mut Defects) {
@@ -72,7 +73,7 @@ pub(super) fn count_duplicates(polygons: &Polygons<'_>, mapped: &[bool], defects
     // A sum is the same in any order; scattered, few different sets share one.
     let mut keyed: Vec<(u64, u32)> = (0..polygons.len())
         .filter(|&p| mapped[p])
-        .map(|p| (vertices(p).fold(0u64, |sum, v| sum.wrapping_add(scatter(v))), p as u32))
+        .map(|p| (vertices(p).fold(0u64, |sum, v| sum.wrapping_add(word(0, u64::from(v)))), p as u32))
         .collect();
     keyed.par_sort_unstable();
     let sorted = |p: u32| {
@@ -88,12 +89,4 @@ pub(super) fn count_duplicates(polygons: &Polygons<'_>, mapped: &[bool], defects
     }
     duplicates.sort_unstable();
     duplicates.iter().for_each(|&p| defects.duplicate_faces.found(p));
-}
-
-/// A 64-bit number for a vertex, by the finaliser of SplitMix64 (Steele, Lea, Flood 2014).
-fn scatter(v: u32) -> u64 {
-    let mut z = (u64::from(v) + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
 }

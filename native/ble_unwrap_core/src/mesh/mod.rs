@@ -6,7 +6,6 @@ mod coarsen;
 mod collapse;
 mod condition;
 mod defects;
-mod disjoint_sets;
 mod ear_clipping;
 mod frame;
 mod glue;
@@ -27,7 +26,6 @@ mod weld;
 
 pub(crate) use coarsen::{Coarse, coarsen};
 pub(crate) use condition::{ConditionOptions, Surface, condition};
-pub(crate) use disjoint_sets::DisjointSets;
 pub(crate) use groups::Groups;
 pub(crate) use index::{FaceId, HalfedgeId, VertexId};
 pub use input::{MeshError, MeshInput};

@@ -1,7 +1,7 @@
 //! One winding for each component, and cuts where a surface has only one side.
 
-use super::disjoint_sets::DisjointSets;
 use super::glue::Link;
+use crate::collections::DisjointSets;
 
 /// Which polygons to turn over, and the links that no choice of windings can satisfy.
 #[derive(Clone, Debug, Default)]

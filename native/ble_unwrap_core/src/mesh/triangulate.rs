@@ -6,6 +6,7 @@ use super::defects::Defect;
 use super::ear_clipping::clip_ears;
 use super::input::{MeshError, Polygons};
 use super::measure::area_vector;
+use crate::collections::DisjointSets;
 use crate::progress::Progress;
 
 /// Every polygon as n − 2 triangles that form a topological disk.
@@ -167,24 +168,14 @@ fn is_triangulation(triangles: &[[u32; 3]], n: usize) -> bool {
     if sides != n || !all_sides_once(triangles, n) || diagonals.len() % 2 != 0 {
         return false;
     }
-    let mut leader: Vec<usize> = (0..triangles.len()).collect();
+    let mut sets = DisjointSets::new(triangles.len());
     let mut pieces = triangles.len();
     for pair in diagonals.chunks_exact(2) {
         let (first, second) = (pair[0], pair[1]);
         if (first.0, first.1) != (second.0, second.1) || first.2 == second.2 {
             return false;
         }
-        let [a, b] = [first.3, second.3].map(|mut t| {
-            while leader[t] != t {
-                leader[t] = leader[leader[t]];
-                t = leader[t];
-            }
-            t
-        });
-        if a != b {
-            pieces -= 1;
-            leader[a.max(b)] = a.min(b);
-        }
+        pieces -= usize::from(sets.join(first.3, second.3));
     }
     pieces == 1
 }

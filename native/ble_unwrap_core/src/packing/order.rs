@@ -2,6 +2,7 @@
 
 use super::goal::Goal;
 use super::shape::Shape;
+use crate::random::{GOLDEN, mix};
 
 /// A way to place all charts.
 #[derive(Clone, Debug)]
@@ -105,13 +106,7 @@ impl Strategy {
     }
 }
 
-/// A random word for each pair of counters. Steele, Lea, Flood: Fast splittable pseudorandom number
-/// generators, OOPSLA 2014 (the finaliser, applied twice).
+/// A random word for each pair of counters.
 fn random(a: u64, b: u64) -> u64 {
-    let mix = |mut z: u64| {
-        z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ z >> 31
-    };
-    mix(mix(a.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(1)).wrapping_add(b.wrapping_mul(0xD1B5_4A32_D192_ED03)))
+    mix(mix(a.wrapping_mul(GOLDEN).wrapping_add(1)).wrapping_add(b.wrapping_mul(0xD1B5_4A32_D192_ED03)))
 }

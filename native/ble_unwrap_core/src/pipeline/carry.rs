@@ -3,7 +3,8 @@
 use nalgebra::Point3;
 
 use crate::charts::Chart;
-use crate::mesh::{DisjointSets, FaceId, HalfedgeId, TriMesh, VertexId};
+use crate::collections::DisjointSets;
+use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 
 use super::darts::Sewn;
 

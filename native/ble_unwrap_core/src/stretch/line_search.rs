@@ -13,6 +13,7 @@ use crate::distortion::{RestTriangle, squared_stretch};
 use crate::mesh::{TriMesh, VertexId};
 use crate::predicates::orientation;
 use crate::progress::Progress;
+use crate::random::word;
 
 /// Steps of golden section: they narrow the line to 0.618²⁴ ≈ 1e-5 of itself.
 const SECTION_STEPS: usize = 24;
@@ -130,7 +131,8 @@ fn run_sweep(
         if count % CHECK_EVERY == 0 {
             progress.check()?;
         }
-        let random = splitmix(splitmix(splitmix(seed.0).wrapping_add(seed.1)).wrapping_add(v.index() as u64));
+        let random =
+            [seed.1, v.index() as u64].into_iter().fold(word(seed.0, 0), |hash, i| word(hash.wrapping_add(i), 0));
         // 53 random bits make an angle.
         let angle = std::f64::consts::TAU * (random >> 11) as f64 / (1u64 << 53) as f64;
         let (sin, cos) = angle.sin_cos();
@@ -206,14 +208,6 @@ fn search_line(
         *sums = better;
         uv[v.index()] = place;
     }
-}
-
-/// A bijective hash of 64 bits (Steele, Lea, Flood: Fast splittable pseudorandom number generators, 2014).
-fn splitmix(x: u64) -> u64 {
-    let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
 }
 
 #[cfg(test)]

@@ -1,10 +1,17 @@
 //! Random numbers that depend on a seed and an index only, never on the order they are drawn in.
 
-/// One 64-bit word of the SplitMix64 sequence of `seed`.
+/// Between two words of the sequence of SplitMix64: 2⁶⁴ divided by the golden ratio.
+pub(crate) const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// Word `index` of the sequence of SplitMix64 that begins at `seed`, 64 bits.
 ///
 /// Steele, Lea, Flood: Fast splittable pseudorandom number generators, OOPSLA 2014, figure 15.
-fn word(seed: u64, index: u64) -> u64 {
-    let mut z = seed.wrapping_add(index.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+pub(crate) fn word(seed: u64, index: u64) -> u64 {
+    mix(seed.wrapping_add(index.wrapping_add(1).wrapping_mul(GOLDEN)))
+}
+
+/// The bijection of 64 bits that makes words of equidistant numbers: the finaliser of SplitMix64.
+pub(crate) fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
@@ -16,7 +23,7 @@ fn uniform(seed: u64, index: u64) -> f64 {
 }
 
 /// Number `index` of a standard normal sequence (Box and Muller 1958); each takes two words.
-pub(super) fn normal(seed: u64, index: u64) -> f64 {
+pub(crate) fn normal(seed: u64, index: u64) -> f64 {
     // The seed itself is hashed, so that neighbouring seeds do not give shifted sequences.
     let seed = word(seed, u64::MAX);
     let radius = (-2.0 * uniform(seed, 2 * index).ln()).sqrt();
