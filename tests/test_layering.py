@@ -15,7 +15,18 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "native/ble_unwrap_core/src"
 
-FOUNDATION = {"choice", "error_kind", "memory", "predicates", "progress", "rounds", "linalg", "mesh"}
+FOUNDATION = {
+    "choice",
+    "collections",
+    "error_kind",
+    "memory",
+    "predicates",
+    "progress",
+    "random",
+    "rounds",
+    "linalg",
+    "mesh",
+}
 TOOLS = FOUNDATION | {"geodesics", "distortion"}
 # In the order of the pipeline. A stage sees the types that earlier stages put out, never their functions.
 STAGES = ["segmentation", "charts", "embedding", "stretch", "packing"]
@@ -26,13 +37,15 @@ RESULTS = {"atlas", "clock", "report"}
 # Module of the core -> modules all of whose public items it may use.
 MAY_USE = {
     "choice": set(),
+    "collections": set(),
     "error_kind": set(),
     "memory": set(),
     "progress": {"error_kind", "memory"},
     "predicates": set(),
+    "random": set(),
     "rounds": {"progress"},
     "linalg": {"memory", "progress"},
-    "mesh": {"error_kind", "memory", "predicates", "progress"},
+    "mesh": {"collections", "error_kind", "memory", "predicates", "progress", "random"},
     "geodesics": FOUNDATION,
     "distortion": FOUNDATION,
     **dict.fromkeys(STAGES, TOOLS),
