@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "native/ble_unwrap_core/src"
 
-FOUNDATION = {"choice", "memory", "progress", "linalg", "mesh"}
+FOUNDATION = {"choice", "collections", "memory", "progress", "random", "linalg", "mesh"}
 TOOLS = FOUNDATION | {"geodesics", "distortion"}
 # In the order of the pipeline. A stage sees the types that earlier stages put out, never their functions.
 STAGES = ["segmentation", "charts", "embedding", "stretch", "packing"]
@@ -26,10 +26,12 @@ RESULTS = {"atlas", "clock", "report"}
 # Module of the core -> modules all of whose public items it may use.
 MAY_USE = {
     "choice": set(),
+    "collections": set(),
     "memory": set(),
     "progress": {"memory"},
+    "random": set(),
     "linalg": {"memory", "progress"},
-    "mesh": {"memory", "progress"},
+    "mesh": {"collections", "memory", "progress", "random"},
     "geodesics": FOUNDATION,
     "distortion": FOUNDATION,
     **dict.fromkeys(STAGES, TOOLS),
