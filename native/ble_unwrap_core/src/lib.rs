@@ -1,7 +1,8 @@
 //! BLE Unwrap: automatic UV unwrapping by Bernoulli logistic embedding.
 //!
-//! [`unwrap()`] takes a polygon mesh ([`MeshInput`]) to an [`Atlas`]: a UV for every polygon corner, in few
-//! charts, each with bounded stretch, without flips and overlap. [`unwrap_points()`] does the same for point clouds.
+//! [`unwrap()`] takes a polygon mesh ([`MeshInput`]) and returns an [`Atlas`]: one UV for every polygon corner, with the
+//! surface cut into few charts, each of which has bounded stretch, no flipped triangles and no overlap. [`unwrap_points()`]
+//! does the same for point clouds, as far as that can be told without triangles.
 //!
 //! | module | for |
 //! |---|---|
@@ -11,9 +12,9 @@
 //! | [`embedding`] | the paper's method for points of any kind |
 //! | [`memory`] | hosts with an allocator of their own |
 //!
-//! All functions take and give plain arrays and check what they are given. Vertices, corners and faces are numbered from 0, as
-//! in the input. The work is done on the `rayon` thread pool of the caller, and the result is the same, bit for bit, for any
-//! number of threads.
+//! All functions take and return plain arrays, and check what they are given. Vertices, corners and faces are numbered from
+//! 0, as in the input. The work is done on the caller's `rayon` thread pool, and the result is the same, bit for bit, for
+//! any number of threads.
 //!
 //! # Unwrapping a mesh
 //!
@@ -43,8 +44,8 @@
 //! # What an error looks like
 //!
 //! Every error is an enumeration whose text names the offending element and the remedy; its `kind` says whose fault it is, by
-//! which a host chooses its own exception.
-//!
+//! Every error is an enumeration whose text names the offending element and, where there is one, the remedy. Its method
+//! `kind` says whose fault the error is; a host can choose an exception of its own by it.
 //! ```
 //! use ble_unwrap_core::{ErrorKind, MeshInput, Progress, Settings, unwrap};
 //!
@@ -65,8 +66,9 @@
 //! # Judging any layout
 //!
 //! [`measure_layout`](standalone::measure_layout) says how good a layout is, whoever made it,
-//! [`certify`](standalone::certify) proves that it holds what an atlas promises, or names what it breaks.
-//!
+//! [`measure_layout`](standalone::measure_layout) says how good a layout is, whoever made it.
+//! [`certify`](standalone::certify) either proves that a layout keeps what an atlas promises, or names the rules that it
+//! breaks.
 //! ```
 //! use ble_unwrap_core::standalone::{certify, measure_layout};
 //! use ble_unwrap_core::{MeshInput, Progress, Settings};
@@ -111,12 +113,13 @@
 //! let between = f64::hypot(x(0)[0] - x(24)[0], x(0)[1] - x(24)[1]) * found.sigma.sqrt();
 //! assert!((between - distance(0, 24)).abs() < 1e-3);
 //! # Ok::<(), ble_unwrap_core::embedding::EmbeddingError>(())
-//! ```
+//! Errors, results, reports and enumerations may grow in any release, and are therefore `non_exhaustive`. The exceptions
+//! are [`ErrorKind`] and the rows and kinds of the table of [`settings`], because a host has to know all of them.
+//! Structures of parameters may grow, too. Where such a structure has a default, build it by `..Default::default()`, as
+//! above, rather than from all its fields.
 //!
-//! # What may change
-//!
-//! Errors, results, reports and enumerations may grow in any release and are `non_exhaustive`, but for [`ErrorKind`] and the rows
-//! and kinds of the table of [`settings`], where a host has to know all there are. Structures of parameters may grow, too: where
+//! "The paper" is *Bernoulli Embedding Model and Its Application in Texture Mapping*, revised 2006. Where a function
+//! follows it, the documentation of the function names the section, and the number of an equation in parentheses.
 //! they have a default, build them by `..Default::default()`, as above, rather than from all their fields.
 //!
 //! The paper: *Bernoulli Embedding Model and Its Application in Texture Mapping*, revised 2006. Where a
