@@ -14,37 +14,38 @@ const FIRST_TRY: usize = 8;
 /// Pieces that the text names, the largest one apart.
 const NAMED: usize = 5;
 
-/// A piece of a graph.
+/// A connected piece of a neighbourhood graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Piece {
-    /// Number of points.
+    /// Number of points in the piece.
     pub size: usize,
-    /// The first of them.
+    /// The lowest of these points.
     pub point: usize,
 }
 
-/// How a point cloud hangs together by the edges to nearest neighbours. As a text it names the pieces and says what
-/// connects them.
+/// How the points of a cloud are connected by the edges to their nearest neighbours. Displayed as text, it names the pieces
+/// and says what would connect them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Connectivity {
-    /// Neighbours of each point.
+    /// Number of neighbours that each point is joined to.
     pub neighbours: usize,
-    /// The pieces of their graph, the largest first, of equally large ones that of lower index. A small piece is
-    /// a cluster of outliers: more than `neighbours` of them, since fewer have neighbours elsewhere.
+    /// The connected pieces of the neighbourhood graph, the largest first; of equally large pieces, the one with the lower
+    /// point first. A small piece is a cluster of outliers. It has more points than `neighbours`, since a point of a
+    /// smaller one would have neighbours elsewhere.
     pub pieces: Vec<Piece>,
     /// Points with a coordinate that is not finite. They are in no piece.
     pub nowhere: Vec<usize>,
-    /// The least number of neighbours that connects all points, if there is one up to `tried`; `neighbours` itself if
-    /// that does.
+    /// The least number of neighbours that connects all points, if some number up to `tried` does; equal to `neighbours` if
+    /// that number does.
     pub enough: Option<usize>,
-    /// The largest number of neighbours looked at.
+    /// The largest number of neighbours that was tried.
     pub tried: usize,
 }
 
 impl Connectivity {
-    /// Whether there is one piece at most.
+    /// Whether all points with finite coordinates are in one piece.
     #[must_use]
     pub fn is_connected(&self) -> bool {
         self.pieces.len() <= 1
