@@ -6,7 +6,7 @@
 //!
 //! | module | for |
 //! |---|---|
-//! | this one | meshes and point clouds to atlases, watched and cancelled by a [`Progress`] |
+//! | this module | meshes and point clouds to atlases, watched and cancelled by a [`Progress`] |
 //! | [`settings`] | every parameter, its range, and how a host may show it |
 //! | [`standalone`] | single steps: distances, one patch flattened, a layout measured and certified, charts packed |
 //! | [`embedding`] | the paper's method for points of any kind |
