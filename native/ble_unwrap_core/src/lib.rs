@@ -6,9 +6,9 @@
 //!
 //! | module | for |
 //! |---|---|
-//! | this module | meshes and point clouds to atlases, watched and cancelled by a [`Progress`] |
-//! | [`settings`] | every parameter, its range, and how a host may show it |
-//! | [`standalone`] | single steps: distances, one patch flattened, a layout measured and certified, charts packed |
+//! | this module | unwrapping meshes and point clouds; a [`Progress`] watches and cancels it |
+//! | [`settings`] | every parameter, its range, and how a host can present it |
+//! | [`standalone`] | single steps: computing distances, flattening one patch, measuring and certifying a layout, packing charts |
 //! | [`embedding`] | the paper's method for points of any kind |
 //! | [`memory`] | hosts with an allocator of their own |
 //!
@@ -35,9 +35,9 @@
 //! };
 //! let settings = Settings { stretch_limit: 1.05, ..Settings::default() };
 //! let atlas = unwrap(&mesh, &settings, &Progress::new())?;
-//! assert_eq!((atlas.uv.len(), atlas.chart.len()), (24, 6)); // a UV a corner, a chart a face
+//! assert_eq!((atlas.uv.len(), atlas.chart.len()), (24, 6)); // one UV per corner, one chart per face
 //! assert!(atlas.report.l2_worst_chart < 1.05);
-//! assert!(atlas.certificate.is_valid()); // as that of every atlas
+//! assert!(atlas.certificate.is_valid()); // true for every atlas
 //! # Ok::<(), ble_unwrap_core::UnwrapError>(())
 //! ```
 //!
@@ -73,7 +73,7 @@
 //! use ble_unwrap_core::standalone::{certify, measure_layout};
 //! use ble_unwrap_core::{MeshInput, Progress, Settings};
 //!
-//! // Two squares side by side, and a layout that puts both upon each other.
+//! // Two squares side by side, and a layout that puts one on top of the other.
 //! let mesh = MeshInput {
 //!     positions: &[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [2.0, 1.0, 0.0]],
 //!     corner_vertices: &[0, 1, 4, 3, 1, 2, 5, 4],
@@ -107,7 +107,7 @@
 //! assert_eq!(printed.coordinates.len(), 2 * 25);
 //! assert!(printed.trace.windows(2).all(|pair| pair[1] >= pair[0]));
 //!
-//! // The default model, which has intercepts, gives the distances of flat figures back, in units of the root of sigma.
+//! // The default model, which has intercepts, reproduces the distances in a flat figure, in units of √sigma.
 //! let found = embed(input, &EmbedOptions::default(), &EmbeddingSettings::default(), &Progress::new())?;
 //! let x = |i: usize| &found.coordinates[2 * i..2 * i + 2];
 //! let between = f64::hypot(x(0)[0] - x(24)[0], x(0)[1] - x(24)[1]) * found.sigma.sqrt();
