@@ -43,9 +43,9 @@
 //!
 //! # What an error looks like
 //!
-//! Every error is an enumeration whose text names the offending element and the remedy; its `kind` says whose fault it is, by
 //! Every error is an enumeration whose text names the offending element and, where there is one, the remedy. Its method
 //! `kind` says whose fault the error is; a host can choose an exception of its own by it.
+//!
 //! ```
 //! use ble_unwrap_core::{ErrorKind, MeshInput, Progress, Settings, unwrap};
 //!
@@ -65,10 +65,10 @@
 //!
 //! # Judging any layout
 //!
-//! [`measure_layout`](standalone::measure_layout) says how good a layout is, whoever made it,
 //! [`measure_layout`](standalone::measure_layout) says how good a layout is, whoever made it.
 //! [`certify`](standalone::certify) either proves that a layout keeps what an atlas promises, or names the rules that it
 //! breaks.
+//!
 //! ```
 //! use ble_unwrap_core::standalone::{certify, measure_layout};
 //! use ble_unwrap_core::{MeshInput, Progress, Settings};
@@ -113,17 +113,19 @@
 //! let between = f64::hypot(x(0)[0] - x(24)[0], x(0)[1] - x(24)[1]) * found.sigma.sqrt();
 //! assert!((between - distance(0, 24)).abs() < 1e-3);
 //! # Ok::<(), ble_unwrap_core::embedding::EmbeddingError>(())
+//! ```
+//!
+//! # What may change
+//!
 //! Errors, results, reports and enumerations may grow in any release, and are therefore `non_exhaustive`. The exceptions
 //! are [`ErrorKind`] and the rows and kinds of the table of [`settings`], because a host has to know all of them.
 //! Structures of parameters may grow, too. Where such a structure has a default, build it by `..Default::default()`, as
 //! above, rather than from all its fields.
 //!
-//! "The paper" is *Bernoulli Embedding Model and Its Application in Texture Mapping*, revised 2006. Where a function
-//! follows it, the documentation of the function names the section, and the number of an equation in parentheses.
-//! they have a default, build them by `..Default::default()`, as above, rather than from all their fields.
+//! # The paper
 //!
-//! The paper: *Bernoulli Embedding Model and Its Application in Texture Mapping*, revised 2006. Where a
-//! function follows it, its documentation names section and equation.
+//! "The paper" is *Bernoulli Embedding Model and Its Application in Texture Mapping*, revised 2006. Where a function
+//! follows it, the documentation of the function names the section and the number of the equation.
 #![forbid(unsafe_code)]
 #![warn(unnameable_types)]
 

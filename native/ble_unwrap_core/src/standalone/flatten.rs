@@ -174,32 +174,32 @@ pub struct FlattenReport {
     pub model: Model,
     /// Number of vertices of the surface.
     pub vertices: usize,
-    /// Number of landmarks; this is the number of vertices if all were embedded together.
+    /// Number of triangles of the surface.
     pub triangles: usize,
-    /// Number of landmarks; all vertices if they were embedded together.
+    /// Number of landmarks; this is the number of vertices if all were embedded together.
     pub landmarks: usize,
-    /// Number of sweeps of the fit; 0 for Isomap.
+    /// The kernel width σ, in units of squared distance.
     pub sigma: f64,
-    /// Sweeps of the fit; 0 for Isomap.
+    /// Number of sweeps of the fit; 0 for Isomap.
     pub sweeps: usize,
-    /// Log-likelihood (equation 4 of the paper) at the end; `None` for Isomap.
+    /// Whether the fit reached its tolerance.
     pub converged: bool,
-    /// The log-likelihood at the start and after each sweep.
+    /// Log-likelihood (equation 4 of the paper) at the end; `None` for Isomap.
     pub log_likelihood: Option<f64>,
-    /// The quality of the map as the embedding gave it.
+    /// The log-likelihood at the start and after each sweep.
     pub trace: Vec<f64>,
-    /// The quality of the map that is returned.
+    /// The quality of the map as the embedding gave it.
     pub before: MapQuality,
+    /// The quality of the map that is returned.
+    pub after: MapQuality,
     /// The method that removed the flips: `embedding` if the embedding had none, else `foldover_free`, `tutte_shape` or
     /// `tutte_circle`.
-    pub after: MapQuality,
-    /// Number of iterations of the stretch minimisation; 0 if it was not asked for.
     pub rung: &'static str,
-    /// Whether the boundary of the result is simple. If it is, the map does not overlap itself, since it has no flips.
+    /// Number of iterations of the stretch minimisation; 0 if it was not asked for.
     pub stretch_iterations: usize,
-    /// Name and duration in seconds of each step, in order.
+    /// Whether the boundary of the result is simple. If it is, the map does not overlap itself, since it has no flips.
     pub boundary_is_simple: bool,
-    /// Seconds of each step, in order.
+    /// Name and duration in seconds of each step, in order.
     pub seconds: Vec<(&'static str, f64)>,
 }
 
