@@ -162,7 +162,7 @@ impl Progress {
         f64::from_bits(self.fraction.load(Ordering::Relaxed))
     }
 
-    /// Enters a stage. Only the computation itself calls this.
+    /// Says that a stage begins. The computation calls this itself; hosts need not.
     pub fn enter(&self, stage: Stage) {
         self.stage.store(stage as u8, Ordering::Relaxed);
         self.raise(stage.begin());

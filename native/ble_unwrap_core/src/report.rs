@@ -40,13 +40,13 @@ pub struct Report {
     pub seam_length_absolute: f64,
     /// Share of the unit square that charts cover.
     pub packing_efficiency: f64,
-    /// Least distance between two charts in texels. Distances are measured up to eight texels or twice the margin,
-    /// whichever is more; this value stands for all larger ones.
+    /// Least distance between two charts in texels. A distance above eight texels and above twice the margin is given as
+    /// the larger of these two values.
     pub gap_texels: f64,
     /// Name and duration in seconds of each stage, in order. They are for information only: no result depends on time.
     pub seconds: Vec<(&'static str, f64)>,
-    /// How many charts were made by each method of flattening, from the first choice to the last resort: its name and the
-    /// number of charts.
+    /// How many charts were made by each method of flattening: pairs of the method's name and the number of charts. Where
+    /// one method fails, the next is tried.
     pub rungs: Vec<(&'static str, usize)>,
     /// The L2 stretch that each chart was held to.
     pub chart_limit: f64,

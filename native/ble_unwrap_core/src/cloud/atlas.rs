@@ -60,7 +60,7 @@ pub struct CloudReport {
     pub landmarks: usize,
     /// Number of sweeps, summed over all embeddings.
     pub sweeps: usize,
-    /// How many charts were made by each method: its name and the number of charts.
+    /// How many charts were made by each method: pairs of the method's name and the number of charts.
     pub rungs: Vec<(&'static str, usize)>,
     /// Name and duration in seconds of each stage, in order.
     pub seconds: Vec<(&'static str, f64)>,

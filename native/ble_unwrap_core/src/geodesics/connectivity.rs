@@ -20,7 +20,7 @@ const NAMED: usize = 5;
 pub struct Piece {
     /// Number of points in the piece.
     pub size: usize,
-    /// The lowest of these points.
+    /// The point of the piece with the lowest number.
     pub point: usize,
 }
 
@@ -31,9 +31,9 @@ pub struct Piece {
 pub struct Connectivity {
     /// Number of neighbours that each point is joined to.
     pub neighbours: usize,
-    /// The connected pieces of the neighbourhood graph, the largest first; of equally large pieces, the one with the lower
-    /// point first. A small piece is a cluster of outliers. It has more points than `neighbours`, since a point of a
-    /// smaller one would have neighbours elsewhere.
+    /// The connected pieces of the neighbourhood graph, the largest first; equally large pieces are in the order of their
+    /// `point`. A small piece is a cluster of outliers. It has more points than `neighbours`, since a point of a smaller
+    /// one would have neighbours elsewhere.
     pub pieces: Vec<Piece>,
     /// Points with a coordinate that is not finite. They are in no piece.
     pub nowhere: Vec<usize>,

@@ -27,7 +27,7 @@ pub struct GeodesicSettings {
     pub metric: Metric,
     /// Number of landmarks divided by the number of vertices: the paper's α (section 5).
     pub landmark_fraction: f64,
-    /// Least number of landmarks; all vertices are landmarks where there are fewer.
+    /// Least number of landmarks. If a mesh has fewer vertices than this, all of them are landmarks.
     pub landmark_min: usize,
     /// Greatest number of landmarks.
     pub landmark_max: usize,

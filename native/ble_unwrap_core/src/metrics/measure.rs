@@ -33,7 +33,7 @@ const RANGE_SLACK: f64 = 1e-5;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ChartMeasures {
-    /// The lowest triangle of the chart.
+    /// The triangle of the chart that has the lowest number.
     pub first_triangle: usize,
     /// The label that was given for that triangle.
     pub label: i32,
@@ -76,7 +76,7 @@ pub struct Measures {
     /// largest chart has less than a hundredth of the surface, those with less than a hundredth of its area are left out
     /// instead.
     pub l2_worst_chart: f64,
-    /// Label of the lowest triangle of the worst chart.
+    /// Label of the triangle with the lowest number in the worst chart.
     pub worst_chart: Option<i32>,
     /// L-infinity stretch: the largest singular value of the map from UV to the surface, over all triangles, at the
     /// layout's scale.
@@ -103,14 +103,14 @@ pub struct Measures {
     /// that a pair of triangles covers twice is subtracted once for each pair, so the value means nothing if
     /// `overlaps_complete` is false.
     pub packing_efficiency: f64,
-    /// Least distance between two islands in texels; 0 if boundaries cross. Distances are measured up to eight texels or
-    /// twice the margin, whichever is more; this value stands for all larger ones.
+    /// Least distance between two islands in texels; 0 if boundaries cross. A distance above eight texels and above twice
+    /// the margin is given as the larger of these two values.
     pub gap_texels: f64,
     /// False if there was too much to search. The gap is then an upper bound.
     pub gap_complete: bool,
     /// Least and greatest coordinate along u, then along v; NaN if there are no UVs.
     pub uv_box: [[f64; 2]; 2],
-    /// The measures of each chart. Charts are in the order of their lowest triangles.
+    /// The measures of each chart. Charts are in the order of their `first_triangle`.
     pub per_chart: Vec<ChartMeasures>,
 }
 

@@ -44,10 +44,10 @@ use memo::Run;
 /// flipped or without area; no chart overlaps itself or another; charts keep the margin. Where this cannot be proven, the
 /// call fails.
 ///
-/// Every chart has an L2 stretch within `settings.stretch_limit`, or is listed in the report (a single polygon may have
-/// more by itself). Where [`Settings::limit_over`] is the atlas, a chart is held to [`Settings::chart_limit`] instead, and
-/// the whole layout is within `settings.stretch_limit`, or a warning in the report says that it is not. The result is the
-/// same, bit for bit, for any number of threads.
+/// Every chart has an L2 stretch within `settings.stretch_limit`, or is listed in the report (a single polygon, which is
+/// never cut, may have more). Where [`Settings::limit_over`] is the atlas, a chart is held to [`Settings::chart_limit`]
+/// instead, and the whole layout is within `settings.stretch_limit`, or a warning in the report says that it is not. The
+/// result is the same, bit for bit, for any number of threads.
 ///
 /// Not guaranteed: the fewest charts or the shortest seams possible.
 ///

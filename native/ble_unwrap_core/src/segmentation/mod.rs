@@ -52,8 +52,9 @@ pub struct SegmentationSettings {
     /// Share of length and creases in the cost of a cut after the first split, from 0 to 1. The rest is the share of the
     /// embedding errors.
     pub crease_share: f64,
-    /// How strongly seams are drawn to creases, from 0 to 2: 0 means not at all, 1 is as in iso-charts. A seam along an
-    /// edge with the mean dihedral angle costs ½ to the power of this weight, where a seam in a flat place costs 1.
+    /// How strongly seams are drawn to creases, from 0 to 2: 0 means not at all, 1 is as in iso-charts. Where a seam along
+    /// an edge of a flat place costs 1, one along an edge that bends as much as the average edge costs ½ to the power of
+    /// this weight.
     pub crease_weight: f64,
     /// How the crease term and the misfit term make up the cost.
     pub cost: CutCost,
@@ -68,8 +69,7 @@ pub enum CutCost {
     /// third of the cost in a flat place, and cuts leave creases for a slightly shorter path.
     Sum,
     /// crease·(α + (1 − α)·misfit). A crease is then cheap whatever the embedding errors are. On models with creases seams
-    /// get shorter (on a car from 8.7 to 7.3, in units of the square root of the surface area); on some models without
-    /// creases they get a little longer.
+    /// get shorter (on a car their length falls from 8.7 to 7.3); on some models without creases they get a little longer.
     Product,
 }
 

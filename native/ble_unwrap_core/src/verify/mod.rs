@@ -43,7 +43,8 @@ use boundary::{Boundary, Vertices};
 pub struct Defect<T> {
     /// Number of elements that break the rule.
     pub count: usize,
-    /// The lowest such element, unless the checks are not [complete](Certificate::complete).
+    /// The element that breaks the rule and has the lowest number. If the checks are not [complete](Certificate::complete),
+    /// it may be another.
     pub first: Option<T>,
 }
 
@@ -81,26 +82,25 @@ pub struct Certificate {
     /// Triangles that are not strictly positive: they are turned over or have no area.
     pub flipped: Defect<u32>,
     /// Pairs of boundary edges of one chart that cross or touch, except where one follows the other. Each is named by the
-    /// triangles of the two edges, the lower one first. A vertex that a boundary visits twice counts, too.
+    /// triangles of the two edges, the lower number first. A vertex that a boundary visits twice counts, too.
     pub crossings_inside: Defect<(u32, u32)>,
     /// Pairs of boundary edges of different charts that have a point in common, named in the same way.
     pub crossings_between: Defect<(u32, u32)>,
-    /// Boundary loops inside the filled area of another chart. Each is named by a triangle at the loop and the lowest
-    /// triangle of that chart. They are not looked for where contacts were too many to count.
+    /// Boundary loops inside the filled area of another chart. Each is named by a triangle at the loop and the triangle of
+    /// that chart with the lowest number. They are not looked for where contacts were too many to count.
     pub nested: Defect<(u32, u32)>,
     /// Labels of the charts that do not have exactly one positively oriented boundary loop, because they are in pieces or
     /// turned inside out.
     pub bad_loops: Defect<i32>,
     /// Labels of all charts that break a rule, in ascending order.
     pub faulty_charts: Vec<i32>,
-    /// Least distance between the boundaries of different charts in texels. Unlike the checks, it is subject to rounding.
-    /// Distances are measured up to eight texels or twice the margin, whichever is more; this value stands for all larger
-    /// ones.
+    /// Least distance between the boundaries of different charts in texels. Unlike the checks, it is subject to rounding. A
+    /// distance above eight texels and above twice the margin is given as the larger of these two values.
     pub gap_texels: f64,
     /// The margin: the value that `gap_texels` has to reach.
     pub margin_texels: f64,
     /// Whether all searches came to their end. A search gives up when there are too many contacts. The counts are then
-    /// lower bounds, and the first element need not be the lowest; or nothing is proven.
+    /// lower bounds, and the first element need not be the one with the lowest number; or nothing is proven.
     pub complete: bool,
 }
 
