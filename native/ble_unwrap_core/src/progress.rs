@@ -162,7 +162,8 @@ impl Progress {
         f64::from_bits(self.fraction.load(Ordering::Relaxed))
     }
 
-    /// Says that a stage begins. The computation calls this itself; hosts need not.
+    /// Says that a stage begins. The computation calls this for its own stages; a host may call it to report
+    /// [`Stage::Done`].
     pub fn enter(&self, stage: Stage) {
         self.stage.store(stage as u8, Ordering::Relaxed);
         self.raise(stage.begin());

@@ -83,12 +83,12 @@ const GRAPH_WORK: f64 = 0.2;
 /// shape to rounding. The result is the same, bit for bit, for any number of threads.
 ///
 /// Not guaranteed: a measured stretch that is right to better than some thousandths. Where the points themselves are
-/// charted, it comes out up to 0.005 too low, since a mean over a neighbourhood does not see positions waver. (For a
-/// hemisphere of 2,500 points it is 1.017 with 12 neighbours and 1.022 when measured with 30, while the least possible is
-/// 1.021.) Nor are these guaranteed: freedom from folds and overlaps narrower than the spacing of points (those that are
-/// found are counted); the fewest charts; the connectivity that a person would see. Two sheets that are nearer to each
-/// other than their points are grow together, and a piece that is sampled with gaps falls apart. More `neighbours` bridge
-/// wider gaps.
+/// charted, it comes out up to 0.005 too low, since a mean over a neighbourhood smooths away small errors of the positions.
+/// (For a hemisphere of 2,500 points it is 1.017 with 12 neighbours and 1.022 when measured with 30, while the least
+/// possible is 1.021.) Also not guaranteed: freedom from folds and overlaps narrower than the spacing of points (those that
+/// are found are counted); the fewest charts; the connectivity that a person would see. Two sheets are joined if they are
+/// nearer to each other than the points of a sheet are, and a surface that is sampled with gaps is separated into pieces.
+/// More `neighbours` bridge wider gaps.
 ///
 /// The settings of mesh connectivity and of stretch minimisation have no meaning here. `settings.coarse` says whether large
 /// pieces are charted by small groups of points rather than by single points.

@@ -54,7 +54,7 @@ impl Embedding {
     /// landmarks: where its likelihood given the fitted points is greatest or, for Isomap, by landmark scaling. With
     /// geodesic distances, paths from a new point lead over the nearest of the embedded points, as many as the graph has
     /// neighbours. A fitted point, whose distance to itself is 0, is placed where it is already; by affinities, which do
-    /// not tell that two points coincide, nearly there.
+    /// not say whether two points coincide, it is placed only near there.
     ///
     /// The result is the same for any number of threads. O(kq²) for each point; along a graph, also O(np) to find its
     /// neighbours.

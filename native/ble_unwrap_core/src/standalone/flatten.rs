@@ -78,7 +78,7 @@ pub enum FlattenError {
         /// The vertex at the other end.
         b: usize,
     },
-    /// There would be more landmarks than can be handled, since all pairs of them have a distance.
+    /// There would be more landmarks than can be handled, since the distances between all pairs of them are needed.
     #[error(
         "{landmarks} landmarks are more than the {MOST_TOGETHER} whose distances can be handled; lower landmark_fraction or landmark_max"
     )]
@@ -89,7 +89,7 @@ pub enum FlattenError {
     /// The embedding failed.
     #[error(transparent)]
     Embedding(EmbeddingError),
-    /// No map without flips was found: rounding defeated every method that should give one.
+    /// No map without flips was found, because rounding made every method fail.
     #[error("no map without flipped triangles was found")]
     NotInjective,
     /// A numerical method failed where it never should, which is a defect of this library. The text says what happened.

@@ -25,7 +25,7 @@ pub enum Connect {
     /// Return an error, whose text says what would connect the points.
     Error,
     /// Join the pieces by the shortest edges between them. Every path between two pieces then leads over such a bridge, so
-    /// a distance between pieces is right only if there is no other way from one to the other.
+    /// a distance between pieces is correct only if the surface has no other connection between them.
     Bridge,
     /// Leave the pieces separate: distances between them are infinite.
     Separate,
