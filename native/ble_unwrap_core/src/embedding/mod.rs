@@ -3,12 +3,17 @@
 //!
 //! [`embed()`] fits the model to all pairs of points, or to landmarks, among which it then places the other points.
 //! [`place`] and [`Embedding::transform`] place new points. [`unwrap`](crate::unwrap()) embeds each chart by the same
-//! model, from the geodesic distances of its landmarks. # Terms **Affinity** p_ij: how strongly two points belong together,
-//! from their distance through a **Affinity** p_ij: a number from 0 to 1 that says how strongly points i and j belong
-//! together. A **kernel** of **width** σ computes it from their distance. **Landmarks**: the k points from which distances
-//! are measured. **Gauge**: what distances do not determine: reflection, rotation and translation, and for the printed
-//! model the scale. # References Bernoulli embedding model and its application in texture mapping, 2006 ("the paper"),
-//! sections 3 to 5. Wang, Zhao, Zhang, Lochovsky: A Bernoulli relational model for nonlinear embedding, ICDM 2005.
+//! model, from the geodesic distances of its landmarks.
+//!
+//! # Terms
+//! **Affinity** p_ij: a number from 0 to 1 that says how strongly points i and j belong together. A **kernel** of **width**
+//! σ computes it from their distance. **Landmarks**: the k points from which distances are measured. **Gauge**: what
+//! distances do not determine: reflection, rotation and translation, and for the printed model the scale.
+//!
+//! # References
+//! Bernoulli embedding model and its application in texture mapping, 2006 ("the paper"), sections
+//! 3 to 5. Wang, Zhao, Zhang, Lochovsky: A Bernoulli relational model for nonlinear embedding,
+//! ICDM 2005.
 
 mod affinity;
 mod bernoulli_logistic;
