@@ -76,7 +76,7 @@ impl fmt::Display for Connectivity {
         }
         if let [first, ..] = self.nowhere[..] {
             let count = self.nowhere.len();
-            write!(f, "; {count} {} without finite coordinates left out, the first of them point {first}", points(count))?;
+            write!(f, "; {count} {} without finite coordinates left out, the first is point {first}", points(count))?;
         }
         Ok(())
     }
@@ -217,7 +217,7 @@ mod tests {
         assert_eq!(
             found.to_string(),
             "the edges to 3 neighbours leave 43 points in 3 pieces: 30 points about point 0, 8 about 30, 5 about 39; \
-             8 neighbours would connect them; 1 point without finite coordinates left out, the first of them point 38"
+             8 neighbours would connect them; 1 point without finite coordinates left out, the first is point 38"
         );
         let none = judge(&points, 1, 3, 7);
         assert_eq!((none.enough, none.tried), (None, 7));
