@@ -4,15 +4,18 @@ use crate::error::UnwrapError;
 use crate::report::Report;
 use crate::verify::Certificate;
 
-/// A UV for every corner of the input, what is known about it, and the proof that it holds what is promised.
+/// A UV for every corner of the input mesh, the measures of the layout, and the proof that the layout keeps what
+/// [`unwrap()`](crate::unwrap()) promises.
 ///
-/// There is no atlas without a valid certificate: [`unwrap()`](crate::unwrap()) fails where a layout cannot be proven.
+/// There is no atlas without a valid certificate: [`unwrap()`](crate::unwrap()) returns an error where the layout cannot be
+/// proven.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Atlas {
-    /// One UV a corner, in [0, 1]²; (0, 0) for the corners of unmapped faces.
+    /// One UV for each corner, in [0, 1]²; (0, 0) for the corners of faces that are not mapped, because a vertex is not
+    /// finite.
     pub uv: Vec<[f32; 2]>,
-    /// Chart of each input face, from 0; −1 for unmapped faces.
+    /// The chart of each input face, numbered from 0; −1 for faces that are not mapped.
     pub chart: Vec<i32>,
     /// Measures of the result.
     pub report: Report,

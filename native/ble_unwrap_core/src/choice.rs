@@ -1,17 +1,17 @@
 //! Settings that are one of a few values: each value has a word, by which callers in other languages name it.
 
-/// What people are told about one value of a choice.
+/// What users are told about one value of a choice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Named {
-    /// The word for it in Python, on the command line and in files.
+    /// The word for the value in Python, on the command line and in files.
     pub word: &'static str,
-    /// Its name on the screen.
+    /// The name of the value on the screen.
     pub label: &'static str,
-    /// What it means, in one or two sentences.
+    /// What the value means, in one or two sentences.
     pub sentence: &'static str,
 }
 
-/// An enumeration whose values have words.
+/// An enumeration each of whose values has a word.
 pub trait Choice {
     /// All values, in the order in which they are shown.
     fn all(&self) -> &'static [Named];
@@ -19,7 +19,7 @@ pub trait Choice {
     /// The word of the present value.
     fn word(&self) -> &'static str;
 
-    /// Takes the value of that word; false, and nothing changed, where there is none.
+    /// Takes the value with this word. Returns false, and changes nothing, if no value has it.
     fn choose(&mut self, word: &str) -> bool;
 }
 

@@ -30,16 +30,17 @@ pub enum UnwrapError {
     /// The charts cannot be packed as asked.
     #[error(transparent)]
     Pack(PackError),
-    /// The result does not fit the checks.
+    /// The mesh has more triangles than the exact checks can number.
     #[error("{triangles} triangles are more than the 2^30 that can be checked; give the mesh in parts")]
     TooManyTriangles {
         /// Number of triangles.
         triangles: usize,
     },
-    /// There is not enough memory: seen beforehand, or a piece of it was refused.
+    /// There is not enough memory. Either the estimate made before the work began said so, or an allocation was refused.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemory),
-    /// The layout could not be brought to hold what is promised; the certificate says what it breaks.
+    /// No layout was found that keeps what [`unwrap`](crate::unwrap()) promises. The certificate says which rules the last
+    /// one breaks.
     #[error(
         "the layout cannot be proven to be free of flips and overlaps and to keep the margin: {0}; raise the texture size or \
          lower the margin, and please report the mesh"

@@ -1,19 +1,20 @@
 //! BLE Unwrap: automatic UV unwrapping by Bernoulli logistic embedding.
 //!
-//! [`unwrap()`] takes a polygon mesh ([`MeshInput`]) to an [`Atlas`]: a UV for every polygon corner, in few
-//! charts, each with bounded stretch, without flips and overlap. [`unwrap_points()`] does the same for point clouds.
+//! [`unwrap()`] takes a polygon mesh ([`MeshInput`]) and returns an [`Atlas`]: one UV for every polygon corner, with the
+//! surface cut into few charts, each of which has bounded stretch, no flipped triangles and no overlap. [`unwrap_points()`]
+//! does the same for point clouds, as far as that can be told without triangles.
 //!
 //! | module | for |
 //! |---|---|
-//! | this one | meshes and point clouds to atlases, watched and cancelled by a [`Progress`] |
-//! | [`settings`] | every parameter, its range, and how a host may show it |
-//! | [`standalone`] | single steps: distances, one patch flattened, a layout measured and certified, charts packed |
+//! | this module | unwrapping meshes and point clouds; a [`Progress`] watches and cancels it |
+//! | [`settings`] | every parameter, its range, and how a host can present it |
+//! | [`standalone`] | single steps: computing distances, flattening a patch, measuring or certifying a layout, packing charts |
 //! | [`embedding`] | the paper's method for points of any kind |
 //! | [`memory`] | hosts with an allocator of their own |
 //!
-//! All functions take and give plain arrays and check what they are given. Vertices, corners and faces are numbered from 0, as
-//! in the input. The work is done on the `rayon` thread pool of the caller, and the result is the same, bit for bit, for any
-//! number of threads.
+//! All functions take and return plain arrays, and check what they are given. Vertices, corners and faces are numbered from
+//! 0, as in the input. The work is done on the caller's `rayon` thread pool, and the result is the same, bit for bit, for
+//! any number of threads.
 //!
 //! # Unwrapping a mesh
 //!
@@ -34,16 +35,16 @@
 //! };
 //! let settings = Settings { stretch_limit: 1.05, ..Settings::default() };
 //! let atlas = unwrap(&mesh, &settings, &Progress::new())?;
-//! assert_eq!((atlas.uv.len(), atlas.chart.len()), (24, 6)); // a UV a corner, a chart a face
+//! assert_eq!((atlas.uv.len(), atlas.chart.len()), (24, 6)); // one UV per corner, one chart per face
 //! assert!(atlas.report.l2_worst_chart < 1.05);
-//! assert!(atlas.certificate.is_valid()); // as that of every atlas
+//! assert!(atlas.certificate.is_valid()); // true for every atlas
 //! # Ok::<(), ble_unwrap_core::UnwrapError>(())
 //! ```
 //!
 //! # What an error looks like
 //!
-//! Every error is an enumeration whose text names the offending element and the remedy; its `kind` says whose fault it is, by
-//! which a host chooses its own exception.
+//! Every error is an enumeration whose text names the offending element and, where there is one, the remedy. Its method
+//! `kind` says whose fault the error is; a host can choose an exception of its own by it.
 //!
 //! ```
 //! use ble_unwrap_core::{ErrorKind, MeshInput, Progress, Settings, unwrap};
@@ -64,14 +65,15 @@
 //!
 //! # Judging any layout
 //!
-//! [`measure_layout`](standalone::measure_layout) says how good a layout is, whoever made it,
-//! [`certify`](standalone::certify) proves that it holds what an atlas promises, or names what it breaks.
+//! [`measure_layout`](standalone::measure_layout) says how good a layout is, whoever made it.
+//! [`certify`](standalone::certify) either proves that a layout keeps what an atlas promises, or names the rules that it
+//! breaks.
 //!
 //! ```
 //! use ble_unwrap_core::standalone::{certify, measure_layout};
 //! use ble_unwrap_core::{MeshInput, Progress, Settings};
 //!
-//! // Two squares side by side, and a layout that puts both upon each other.
+//! // Two squares side by side, and a layout that puts one on top of the other.
 //! let mesh = MeshInput {
 //!     positions: &[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [2.0, 1.0, 0.0]],
 //!     corner_vertices: &[0, 1, 4, 3, 1, 2, 5, 4],
@@ -105,7 +107,7 @@
 //! assert_eq!(printed.coordinates.len(), 2 * 25);
 //! assert!(printed.trace.windows(2).all(|pair| pair[1] >= pair[0]));
 //!
-//! // The default model, which has intercepts, gives the distances of flat figures back, in units of the root of sigma.
+//! // The default model, which has intercepts, reproduces the distances in a flat figure, in units of √sigma.
 //! let found = embed(input, &EmbedOptions::default(), &EmbeddingSettings::default(), &Progress::new())?;
 //! let x = |i: usize| &found.coordinates[2 * i..2 * i + 2];
 //! let between = f64::hypot(x(0)[0] - x(24)[0], x(0)[1] - x(24)[1]) * found.sigma.sqrt();
@@ -115,12 +117,15 @@
 //!
 //! # What may change
 //!
-//! Errors, results, reports and enumerations may grow in any release and are `non_exhaustive`, but for [`ErrorKind`] and the rows
-//! and kinds of the table of [`settings`], where a host has to know all there are. Structures of parameters may grow, too: where
-//! they have a default, build them by `..Default::default()`, as above, rather than from all their fields.
+//! Errors, results, reports and enumerations may grow in any release, and are therefore `non_exhaustive`. The exceptions
+//! are [`ErrorKind`] and the rows and kinds of the table of [`settings`], because a host has to know all of them.
+//! Structures of parameters may grow, too. Where such a structure has a default, build it by `..Default::default()`, as
+//! above, rather than from all its fields.
 //!
-//! The paper: *Bernoulli Embedding Model and Its Application in Texture Mapping*, revised 2006. Where a
-//! function follows it, its documentation names section and equation.
+//! # The paper
+//!
+//! "The paper" is *Bernoulli Embedding Model and Its Application in Texture Mapping*, revised 2006. Where a function
+//! follows it, the documentation of the function names the section and the number of the equation.
 #![forbid(unsafe_code)]
 #![warn(unnameable_types)]
 

@@ -7,14 +7,14 @@ use thiserror::Error;
 use crate::error_kind::ErrorKind;
 use crate::memory::{self, OutOfMemory};
 
-/// The computation was broken off; nothing was produced.
+/// The computation was stopped before its end, and nothing was produced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum Cancelled {
-    /// It was asked to stop.
+    /// The caller asked it to stop, by [`Progress::cancel`].
     #[error("cancelled")]
     OnRequest,
-    /// There was no memory to go on with.
+    /// There was not enough memory to go on.
     #[error(transparent)]
     OutOfMemory(OutOfMemory),
 }
@@ -30,7 +30,7 @@ impl Cancelled {
     }
 }
 
-/// What the pipeline is doing, in order.
+/// What the computation is doing. The stages are listed in the order in which they happen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 #[repr(u8)]
@@ -39,11 +39,11 @@ pub enum Stage {
     Waiting = 0,
     /// Checking the input and building the manifold mesh.
     Condition,
-    /// Cutting the surface into charts and flattening them; by far the longest.
+    /// Cutting the surface into charts and flattening them. This stage takes by far the longest.
     Charts,
     /// Placing the charts in the unit square.
     Pack,
-    /// Exact checks and the report.
+    /// Checking the result exactly and making the report.
     Verify,
     /// Finished.
     Done,
@@ -77,11 +77,11 @@ impl Stage {
     }
 }
 
-/// Cancel flag and progress of one computation. Share it by reference or `Arc`; every method may be
-/// called from any thread at any time.
+/// The cancel flag and the progress of one computation. Share it by reference or in an `Arc`; every method may be called
+/// from any thread at any time.
 ///
-/// [`Progress::fraction`] only rises. Cancelling is cooperative: the computation looks at the flag
-/// at least every few milliseconds of work per thread.
+/// [`Progress::fraction`] never falls. Cancelling is cooperative: each thread of the computation looks at the flag at least
+/// once in every few milliseconds of work.
 #[derive(Debug)]
 pub struct Progress {
     cancelled: AtomicBool,
@@ -113,7 +113,8 @@ impl Progress {
         Self::default()
     }
 
-    /// The computation starts now: what was refused to others while it waited is no concern of it.
+    /// Says that the computation starts now, so that allocations that were refused to other computations before do not end
+    /// it.
     pub fn begin(&self) {
         self.refusals.store(memory::refusals(), Ordering::Relaxed);
     }
@@ -129,7 +130,7 @@ impl Progress {
         self.cancelled.load(Ordering::Relaxed)
     }
 
-    /// Fails once cancelled: stages write `progress.check()?` in their loops.
+    /// Fails once the computation has been cancelled. The stages call `progress.check()?` in their loops.
     ///
     /// # Errors
     /// [`Cancelled::OnRequest`] after [`Progress::cancel`], [`Cancelled::OutOfMemory`] after
@@ -142,8 +143,8 @@ impl Progress {
         memory::none_since(self.refusals.load(Ordering::Relaxed)).map_err(Cancelled::OutOfMemory)
     }
 
-    /// Whether a check has failed because of [`Progress::cancel`]: the computation can end in nothing but [`Cancelled`] now,
-    /// and does so once it has freed what it held, which takes a while where that is millions of small arrays.
+    /// Whether a check has failed because of [`Progress::cancel`]. From then on the computation can only end with
+    /// [`Cancelled`]. It does so once it has freed its memory, which takes a while where that is millions of small arrays.
     #[must_use]
     pub fn is_stopping(&self) -> bool {
         self.stopping.load(Ordering::Relaxed)
@@ -161,7 +162,8 @@ impl Progress {
         f64::from_bits(self.fraction.load(Ordering::Relaxed))
     }
 
-    /// Enters a stage. For the pipeline.
+    /// Says that a stage begins. The computation calls this for its own stages; a host may call it to report
+    /// [`Stage::Done`].
     pub fn enter(&self, stage: Stage) {
         self.stage.store(stage as u8, Ordering::Relaxed);
         self.raise(stage.begin());

@@ -2,8 +2,8 @@
 
 use crate::metrics::Measures;
 
-/// Quality and history of an unwrapped mesh. Distortions as in [`Measures`]: NaN where not one triangle could be measured,
-/// of which a warning tells.
+/// The quality of an unwrapped mesh, and how it came about. Distortions are defined as in [`Measures`]; they are NaN, and a
+/// warning says so, where not a single triangle could be measured.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
@@ -13,46 +13,49 @@ pub struct Report {
     pub faces: usize,
     /// Input faces without UVs.
     pub unmapped_faces: usize,
-    /// L2 stretch of the whole layout at its best scale; 1 is none.
+    /// L2 stretch of the whole layout at its best scale; 1 means no stretch.
     pub l2: f64,
     /// L2 stretch with every chart at its own best scale.
     pub l2_chart_scale: f64,
-    /// L2 stretch of the worst chart; specks aside, as in [`Measures`].
+    /// L2 stretch of the worst chart. Tiny charts are left out, as in [`Measures`].
     pub l2_worst_chart: f64,
-    /// That chart.
+    /// The number of the worst chart.
     pub worst_chart: Option<usize>,
     /// L-infinity stretch: the largest stretch at any point in any direction.
     pub l_infinity: f64,
-    /// Mean angle distortion, area weighted; 1 is none.
+    /// Mean angle distortion, weighted by area; 1 means none.
     pub angle_distortion: f64,
-    /// Mean area distortion, area weighted; 1 is none.
+    /// Mean area distortion, weighted by area; 1 means none.
     pub area_distortion: f64,
-    /// Triangles turned over.
+    /// Number of triangles that are turned over.
     pub flips: usize,
-    /// Quads that are convex on the surface and bent in UV: by one of its two diagonals such a quad is drawn with a triangle
-    /// turned over.
+    /// Number of quads that are convex on the surface but not in UV. A renderer that divides such a quad by one of its two
+    /// diagonals draws a triangle that is turned over.
     pub bent_quads: usize,
-    /// Pairs of triangles that share area.
+    /// Number of pairs of triangles that overlap.
     pub overlaps: u64,
-    /// Length of the seams over the square root of the surface area.
+    /// Length of the seams, divided by the square root of the surface area.
     pub seam_length: f64,
-    /// Length of the seams in units of the mesh.
+    /// Length of the seams in the unit of the mesh.
     pub seam_length_absolute: f64,
-    /// Covered share of the unit square.
+    /// Share of the unit square that charts cover.
     pub packing_efficiency: f64,
-    /// Least distance between charts in texels, up to eight or twice the margin.
+    /// Least distance between two charts in texels. A distance above eight texels and above twice the margin is given as
+    /// the larger of these two values.
     pub gap_texels: f64,
-    /// Seconds spent in each stage, in order. For the eye only: nothing is decided by time.
+    /// Name and duration in seconds of each stage, in order. They are for information only: no result depends on time.
     pub seconds: Vec<(&'static str, f64)>,
-    /// How many charts were made by each rung of the ladder of fallbacks.
+    /// How many charts were made by each method of flattening: pairs of the method's name and the number of charts. Where
+    /// one method fails, the next is tried.
     pub rungs: Vec<(&'static str, usize)>,
     /// The L2 stretch that each chart was held to.
     pub chart_limit: f64,
-    /// The L2 stretch that the whole layout was held to (`l2`, with charts of uniform scale), if the limit was over that.
+    /// The L2 stretch that the whole layout was held to, if [`Settings::limit_over`](crate::Settings::limit_over) is the
+    /// atlas. It bounds `l2` where charts have uniform scale.
     pub atlas_limit: Option<f64>,
-    /// Charts above `chart_limit`, with their L2 stretch, ascending.
+    /// Charts whose L2 stretch is above `chart_limit`: number and L2 stretch of each, in ascending order of the numbers.
     pub charts_over_limit: Vec<(usize, f64)>,
-    /// What the user should know besides, in sentences.
+    /// What else the user should know, in whole sentences.
     pub warnings: Vec<String>,
 }
 

@@ -4,62 +4,67 @@ use std::collections::HashMap;
 
 use thiserror::Error;
 
-/// A UV for every point of a cloud.
+/// A UV and a chart for every point of a cloud, and the measures of the layout.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct PointAtlas {
-    /// One UV a point, in [0, 1]²; (0, 0) for points whose position is not finite.
+    /// One UV for each point, in [0, 1]²; (0, 0) for points whose position is not finite.
     pub uv: Vec<[f32; 2]>,
-    /// Chart of each point, from 0; −1 for points whose position is not finite.
+    /// The chart of each point, numbered from 0; −1 for points whose position is not finite.
     pub chart: Vec<i32>,
     /// Measures of the result.
     pub report: CloudReport,
 }
 
-/// Quality and history of an atlas of points. Stretch is that of the least-squares map of each point's neighbourhood in
-/// its tangent plane to the texture: with σ₁ ≥ σ₂ its singular values, the squared L2 stretch is ½(1/σ₁² + 1/σ₂²); points whose neighbours lie on a line have none.
+/// The quality of an atlas of points, and how it came about.
+///
+/// The stretch at a point is that of the least-squares map from its neighbourhood, in its tangent plane, to the texture. If
+/// σ₁ ≥ σ₂ are the singular values of this map, the squared L2 stretch is ½(1/σ₁² + 1/σ₂²). Points whose neighbours lie on
+/// a line have no stretch.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct CloudReport {
     /// Number of points.
     pub points: usize,
-    /// Points without UV: those whose position is not finite.
+    /// Number of points without a UV, because their position is not finite.
     pub unmapped_points: usize,
-    /// Points that coincide with an earlier one, whose UV they share.
+    /// Number of points that coincide with an earlier point. They share its UV.
     pub duplicate_points: usize,
-    /// Connected pieces of the neighbourhood graph.
+    /// Number of connected pieces of the neighbourhood graph.
     pub pieces: usize,
     /// Number of charts.
     pub charts: usize,
-    /// Charts of less than a texel, enlarged to about one.
+    /// Number of charts that would be smaller than a texel, and were enlarged to about one.
     pub specks: usize,
-    /// L2 stretch of the whole layout, specks aside; 1 is none.
+    /// L2 stretch of the whole layout, without the charts counted by `specks`; 1 means no stretch.
     pub l2: f64,
     /// L2 stretch with every chart at its own best scale.
     pub l2_chart_scale: f64,
-    /// L2 stretch of the worst chart, charts under 1e-4 of the surface aside.
+    /// L2 stretch of the worst chart. Charts with less than 1e-4 of the surface are left out.
     pub l2_worst_chart: f64,
-    /// That chart.
+    /// The number of the worst chart.
     pub worst_chart: Option<usize>,
-    /// Charts over the stretch limit, with their L2 stretch.
+    /// Charts over the stretch limit: the number and the L2 stretch of each.
     pub charts_over_limit: Vec<(usize, f64)>,
-    /// Points whose neighbourhood is turned over against most of their chart.
+    /// Number of points whose neighbourhood has the opposite orientation to most of their chart.
     pub folded_points: usize,
-    /// Pairs of points of one chart that lie upon each other but not near each other on the surface.
+    /// Number of pairs of points of one chart that are on top of each other in the texture but not near each other on the
+    /// surface.
     pub overlaps: usize,
-    /// Covered share of the unit square, a square of its neighbours' distance around each point.
+    /// Share of the unit square that is covered, where each point covers a square as large as the distance to its
+    /// neighbours.
     pub packing_efficiency: f64,
-    /// Points or, in large pieces, cells of points that were charted.
+    /// Number of points that were charted or, in large pieces, of small groups of points that were charted as one.
     pub nodes: usize,
-    /// Landmarks of all charts.
+    /// Number of landmarks, summed over all charts.
     pub landmarks: usize,
-    /// Sweeps of all embeddings.
+    /// Number of sweeps, summed over all embeddings.
     pub sweeps: usize,
-    /// How charts came about, and how often.
+    /// How many charts were made by each method: pairs of the method's name and the number of charts.
     pub rungs: Vec<(&'static str, usize)>,
-    /// Seconds a stage.
+    /// Name and duration in seconds of each stage, in order.
     pub seconds: Vec<(&'static str, f64)>,
-    /// What the user should know.
+    /// What else the user should know, in whole sentences.
     pub warnings: Vec<String>,
 }
 
@@ -67,7 +72,7 @@ pub struct CloudReport {
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PointDefect {
-    /// Not one UV and one chart a point.
+    /// The number of UVs or of chart numbers is not the number of points.
     #[error("there are {uvs} UVs and {charts} chart numbers for {points} points")]
     Count {
         /// Number of UVs.
@@ -77,7 +82,7 @@ pub enum PointDefect {
         /// Number of points.
         points: usize,
     },
-    /// A point has a chart but no position, or a position but no chart.
+    /// A point has a chart but no finite position, or a finite position but no chart.
     #[error("point {point} has chart {chart}, which does not fit its position")]
     Chart {
         /// The point.
@@ -85,7 +90,7 @@ pub enum PointDefect {
         /// Its chart.
         chart: i32,
     },
-    /// A UV outside the unit square.
+    /// A UV lies outside the unit square.
     #[error("the UV of point {point} is ({}, {})", uv[0], uv[1])]
     Outside {
         /// The point.
@@ -93,25 +98,25 @@ pub enum PointDefect {
         /// Its UV.
         uv: [f32; 2],
     },
-    /// Two charts come too near.
+    /// Two charts are closer to each other than the margin.
     #[error("points {first} and {second}, of different charts, are {texels} texels apart")]
     Margin {
         /// A point.
         first: usize,
         /// A point of another chart.
         second: usize,
-        /// Their distance.
+        /// The distance between the two points in texels.
         texels: f64,
     },
 }
 
 impl PointAtlas {
-    /// Checks what is promised: every point of finite position has one chart and a UV in [0, 1]², the others have none;
-    /// points of different charts are at least `margin` texels of a texture of this size apart (to 1/1000 texel).
-    /// O(n) where the points are spread.
+    /// Checks what [`unwrap_points()`](crate::unwrap_points()) promises: every point with a finite position has one chart
+    /// and a UV in [0, 1]²; all other points have none; points of different charts are at least `margin` texels apart (to
+    /// 1/1000 texel) in a texture of `size` texels, width and height. O(n) unless many points crowd in few places.
     ///
     /// # Errors
-    /// The first rule found broken.
+    /// The first broken rule that was found.
     pub fn check_invariants(&self, positions: &[[f64; 3]], size: [u32; 2], margin: f64) -> Result<(), PointDefect> {
         let points = positions.len();
         if self.uv.len() != points || self.chart.len() != points {

@@ -15,7 +15,7 @@ pub enum CloudError {
     /// A setting is out of its range.
     #[error(transparent)]
     Setting(UnwrapError),
-    /// Too few or too many neighbours.
+    /// The number of neighbours is out of its range.
     #[error("neighbours is {value}; it must be from {} to {}", NEIGHBOURS.range[0], NEIGHBOURS.range[1])]
     Neighbours {
         /// What was given.
@@ -27,7 +27,7 @@ pub enum CloudError {
         /// Number of points.
         points: usize,
     },
-    /// More points than indices of 32 bits tell apart.
+    /// There are more points than 32-bit indices can number.
     #[error("{points} points are more than {}; map them in parts", super::MOST_POINTS)]
     TooLarge {
         /// Number of points.
@@ -36,19 +36,19 @@ pub enum CloudError {
     /// The charts cannot be packed as asked.
     #[error(transparent)]
     Pack(PackError),
-    /// The specks alone, each with its margin, need more texels than there are.
+    /// The charts of less than a texel alone, each with its margin, need more texels than there are.
     #[error(
         "{specks} stray points with a margin of {margin} texels do not fit a texture of {width} by {height}: choose \
          a smaller margin or a larger texture, or more neighbours so that they join"
     )]
     TooManySpecks {
-        /// Number of specks.
+        /// Number of charts of less than a texel.
         specks: usize,
-        /// Margin asked for.
+        /// Margin asked for, in texels.
         margin: f64,
-        /// Width of the texture.
+        /// Width of the texture in texels.
         width: u32,
-        /// Height of the texture.
+        /// Height of the texture in texels.
         height: u32,
     },
     /// The caller asked to stop.

@@ -72,29 +72,32 @@ const NEGLIGIBLE: f64 = 1e-4;
 /// Share of the charting stage that the neighbourhood graph takes.
 const GRAPH_WORK: f64 = 0.2;
 
-/// Maps a point cloud to the plane: one UV a point, in charts under a stretch limit, packed into the unit square.
+/// Maps a point cloud to the plane: one UV for each point, in charts under a stretch limit, packed into the unit square.
+/// `neighbours` is the number of nearest neighbours that each point is joined to.
 ///
 /// Guaranteed for every result: each point with finite coordinates lies in exactly one chart and has a UV in [0, 1]²;
-/// coincident points share both; points of different charts are at least the margin apart, in texels, and where the
-/// charts are larger than a texel their splats are, too. Each chart of eight nodes or more has an L2 stretch within
-/// `settings.stretch_limit`, as far as the neighbourhoods tell, or is listed in the report. A piece whose points lie in
-/// a plane keeps its shape to rounding. The same bytes for any number of threads.
+/// coincident points share both; points of different charts are at least the margin apart, in texels. In charts larger than
+/// a texel, this holds also for the squares around the points that reach one spacing of the points to each side. Each chart
+/// of eight nodes or more (points, or groups of points in large pieces) has an L2 stretch within `settings.stretch_limit`,
+/// as far as the neighbourhoods tell, or is listed in the report. A connected piece whose points lie in a plane keeps its
+/// shape to rounding. The result is the same, bit for bit, for any number of threads.
 ///
-/// Not guaranteed: the measured stretch to better than some thousandths: where the points themselves are charted it
-/// comes out up to 0.005 too low (a hemisphere of 2,500 points: 1.017 with 12 neighbours, 1.022 measured with 30, while
-/// its least is 1.021), since a mean over a neighbourhood does not see positions waver. Nor freedom from folds and
-/// overlaps narrower than the spacing of points (those found are counted), the fewest charts, the connectivity a person
-/// would see: two sheets nearer to each other than their points are grow together, and a piece sampled with gaps falls
-/// apart. More `neighbours` bridge wider gaps.
+/// Not guaranteed: a measured stretch that is right to better than some thousandths. Where the points themselves are
+/// charted, it comes out up to 0.005 too low, since a mean over a neighbourhood smooths away small errors of the positions.
+/// (For a hemisphere of 2,500 points it is 1.017 with 12 neighbours and 1.022 when measured with 30, while the least
+/// possible is 1.021.) Also not guaranteed: freedom from folds and overlaps narrower than the spacing of points (those that
+/// are found are counted); the fewest charts; the connectivity that a person would see. Two sheets are joined if they are
+/// nearer to each other than the points of a sheet are, and a surface that is sampled with gaps is separated into pieces.
+/// More `neighbours` bridge wider gaps.
 ///
-/// Of the settings those of meshes' connectivity and stretch minimisation have no meaning here. `coarse` is whether
-/// large pieces are charted by cells.
+/// The settings of mesh connectivity and of stretch minimisation have no meaning here. `settings.coarse` says whether large
+/// pieces are charted by small groups of points rather than by single points.
 ///
 /// O(n log n); some 3 s for 100,000 points and 25 s for a million on two cores.
 ///
 /// # Errors
-/// [`CloudError`]: a setting out of range, no finite point, charts or specks that cannot keep the margin at the texture
-/// size, cancelled.
+/// [`CloudError`]: a setting is out of range, no point is finite, the charts cannot keep the margin at the size of the
+/// texture, or the call was cancelled.
 pub fn unwrap_points(
     positions: &[[f64; 3]],
     neighbours: usize,

@@ -76,11 +76,11 @@ impl Kernel {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum KernelWidth {
-    /// σ itself, in units of squared distance.
+    /// This σ, in units of squared distance.
     Absolute(f64),
-    /// This many times the mean squared distance of all pairs i ≠ j.
+    /// σ is this many times the mean squared distance of all pairs i ≠ j.
     Relative(f64),
-    /// Such that the mean affinity over all pairs i ≠ j has this value.
+    /// σ is such that the mean affinity over all pairs i ≠ j has this value.
     MeanAffinity(f64),
 }
 

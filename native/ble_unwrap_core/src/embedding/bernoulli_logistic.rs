@@ -39,13 +39,15 @@ pub(super) enum LogitModel {
     Printed,
 }
 
-/// Order of the block updates in a sweep (paper, section 4.2).
+/// The order in which points are updated in a sweep (section 4.2 of the paper).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Update {
-    /// One after the other, each seeing those before it: τ = t+1. Monotone for any ω in (0, 2).
+    /// One point after another, each from the present positions of all others (τ = t+1). The likelihood never falls for any
+    /// ω in (0, 2).
     Serial,
-    /// All at once from the last sweep: τ = t. A step that lowers F is retried with half of ω.
+    /// All points at once, from their positions after the last sweep (τ = t). A sweep that lowers the likelihood is
+    /// repeated with half of ω.
     Parallel,
 }
 

@@ -23,21 +23,22 @@ use super::settings::{EmbeddingSettings, Initial, Model};
 use super::source::{Reference, Source, farthest_rows};
 use super::truncated::{Threshold, Truncated, along_graph, between_points};
 
-/// What [`embed()`] takes besides the settings that charts have, too.
+/// The arguments of [`embed()`] besides the settings that the embedding of charts has, too.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmbedOptions<'a> {
-    /// Number of dimensions q ≥ 1 of the result, below the number of points.
+    /// Number of dimensions q of the result: at least 1, and below the number of points.
     pub dimensions: usize,
-    /// How the kernel width σ is chosen; `None` as [`EmbeddingSettings::kernel_width`] says.
+    /// How the kernel width σ is chosen; with `None`, by [`EmbeddingSettings::kernel_width`].
     pub width: Option<KernelWidth>,
     /// Affinities below this count as 0 (paper, section 3); 0 keeps all.
     pub truncation: f64,
-    /// Number of landmarks k > q that are fitted among themselves; `None` fits all points at once.
+    /// Number of landmarks k, above q. The landmarks are fitted among themselves, and the other points are placed among
+    /// them. `None` fits all points together.
     pub landmarks: Option<usize>,
-    /// Start coordinates, n×q row by row, in the unit of [`Embedding::coordinates`], in place of
+    /// The n×q coordinates to start from, row by row, in the unit of [`Embedding::coordinates`]. They replace
     /// [`EmbeddingSettings::initial`].
     pub start: Option<&'a [f64]>,
-    /// Decides a random start.
+    /// Seed of the random start.
     pub seed: u64,
 }
 
@@ -56,25 +57,33 @@ const START_TOLERANCE: f64 = 1e-6;
 /// Relative residual of the eigenpairs that are the result.
 const ISOMAP_TOLERANCE: f64 = 1e-10;
 
-/// Embeds points in q dimensions by the paper's method (sections 3 and 4), its extension, or Isomap for comparison.
+/// Embeds points in q dimensions by the paper's method (sections 3 and 4), by its extension with intercepts, or, for
+/// comparison, by Isomap.
 ///
-/// Guaranteed: the same bytes for any number of threads; from a classical-scaling start the default model returns
-/// Euclidean distances of at most q dimensions as they are, to the precision of the numbers; with serial updates
-/// the likelihood never falls. Not guaranteed: the global maximum; a use for every dimension (one that
-/// classical scaling leaves at 0 stays 0, the printed model folds sheets over). With landmarks, points that are none do
-/// not see each other, and truncation costs what the landmarks then no longer say of far points.
+/// Guaranteed: the result is the same, bit for bit, for any number of threads. From a start by classical scaling, the
+/// default model reproduces Euclidean distances of points in at most q dimensions, to the precision of the numbers. With
+/// serial updates, the likelihood never falls.
 ///
-/// Without landmarks O(n²) memory and O(n²q²) a sweep, some 6 ms for n = 1,000 and q = 2 on one core; points add O(n²p), a
-/// graph n searches, which truncation shortens where σ is absolute or relative. With k landmarks O(n(p + kq²)) time,
-/// along a graph also k searches and 4kn bytes. Relative widths are of the mean over all pairs, along a graph or given
-/// distances with landmarks over their rows, and so are they along a graph with truncation.
+/// Not guaranteed: the global maximum of the likelihood, or that every dimension is used. (A dimension in which classical
+/// scaling gives only 0 stays 0; the printed model folds sheets over.) With landmarks, the other points do not influence
+/// each other. If affinities are truncated as well, what landmarks say about far points is lost.
+///
+/// Without landmarks, the fit takes O(n²) memory and O(n²q²) time for each sweep: some 6 ms for n = 1,000 and q = 2 on one
+/// core. Distances between points add O(n²p). Distances along a graph add n searches, which truncation shortens where σ is
+/// absolute or relative. With k landmarks, it takes O(n(p + kq²)) time, and along a graph also k searches and 4kn bytes.
+///
+/// [`KernelWidth::Relative`] refers to the mean squared distance over all pairs of points. Where there are landmarks, and
+/// distances are given or are measured along a graph, it refers to the mean over the pairs of a landmark and a point. This
+/// is so, too, along a graph with truncation.
 ///
 /// # Errors
-/// [`EmbeddingError::InvalidSetting`]; [`EmbeddingError::TooFewPoints`] and [`EmbeddingError::TooFewPlaces`] unless points
-/// and, with landmarks, distinct places outnumber the dimensions; [`EmbeddingError::OutOfScale`] beyond 1e±30;
-/// [`EmbeddingError::StartNotFinite`], [`EmbeddingError::StartAtSaddle`]; [`EmbeddingError::WrongLength`]; [`EmbeddingError::NotFinite`], [`EmbeddingError::DistanceOutOfRange`] and
-/// [`EmbeddingError::AffinityOutOfRange`] name the first bad value; [`EmbeddingError::Disconnected`];
-/// [`EmbeddingError::TooManyPoints`] to fit at once; [`EmbeddingError::NoExtent`]; cancelled.
+/// [`EmbeddingError::InvalidSetting`]; [`EmbeddingError::TooFewPoints`] and [`EmbeddingError::TooFewPlaces`] unless there
+/// are more points and, with landmarks, more distinct places than dimensions; [`EmbeddingError::OutOfScale`] for values
+/// that are not between 1e-30 and 1e30 in size; [`EmbeddingError::StartNotFinite`] and [`EmbeddingError::StartAtSaddle`];
+/// [`EmbeddingError::WrongLength`]; [`EmbeddingError::NotFinite`], [`EmbeddingError::DistanceOutOfRange`] and
+/// [`EmbeddingError::AffinityOutOfRange`], which name the first bad value; [`EmbeddingError::Disconnected`];
+/// [`EmbeddingError::TooManyPoints`] if there are too many to be fitted together; [`EmbeddingError::NoExtent`];
+/// [`EmbeddingError::Cancelled`].
 pub fn embed(
     input: EmbedInput<'_>,
     options: &EmbedOptions<'_>,

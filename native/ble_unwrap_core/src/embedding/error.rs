@@ -7,11 +7,11 @@ use crate::linalg::EigenError;
 use crate::memory;
 use crate::progress::Cancelled;
 
-/// Why there is no embedding.
+/// Why there is no embedding, or why points cannot be placed.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum EmbeddingError {
-    /// Fewer than three landmarks do not span a plane.
+    /// There are fewer than three landmarks, which do not span a plane.
     #[error("{found} landmarks do not span a plane; at least 3 are needed")]
     TooFewLandmarks {
         /// How many there are.
@@ -27,7 +27,7 @@ pub enum EmbeddingError {
         /// The distance found.
         value: f64,
     },
-    /// All distances are zero, or too small to square.
+    /// All distances are zero, or too small to be squared.
     #[error("all points lie at distance zero of each other")]
     NoExtent,
     /// The landmarks lie on a line, as far as their distances tell.
@@ -54,15 +54,15 @@ pub enum EmbeddingError {
         /// Number given.
         found: usize,
     },
-    /// A coordinate is infinite or not a number, or so large that its square is.
+    /// A coordinate is not finite, or its square is not.
     #[error("component {component} of point {point} is not finite or too large to square")]
     NotFinite {
         /// Number of the point.
         point: usize,
-        /// Number of the component; one past the coordinates for the intercept.
+        /// Number of the coordinate of that point, from 0. For an intercept it is the number of coordinates.
         component: usize,
     },
-    /// A distance is negative, infinite or not a number, or too large to square.
+    /// A distance is negative, not finite, or too large to be squared.
     #[error(
         "the distance from point {row} to point {column} is {value}; it must be finite and not negative{}",
         hint(*.value)
@@ -85,7 +85,7 @@ pub enum EmbeddingError {
         /// The affinity.
         value: f64,
     },
-    /// Coordinates or distances whose squares are lost to rounding, or nearly.
+    /// Coordinates or distances are so large or so small that rounding destroys their squares, or nearly.
     #[error("the largest {what} is {largest:.1e}; scale the data so that it lies between 1e-30 and 1e30")]
     OutOfScale {
         /// What was measured.
@@ -93,7 +93,7 @@ pub enum EmbeddingError {
         /// Its largest size.
         largest: f64,
     },
-    /// Points that coincide are no more landmarks than one.
+    /// The points lie in too few distinct places. Points that coincide count as one landmark.
     #[error("the points lie in {places} distinct places only, which do not span {dimensions} dimensions")]
     TooFewPlaces {
         /// Number of places.
@@ -101,7 +101,7 @@ pub enum EmbeddingError {
         /// Number of dimensions asked for.
         dimensions: usize,
     },
-    /// A coordinate of the start is infinite or not a number.
+    /// A coordinate of the start is not finite.
     #[error("component {component} of point {point} of the start is not finite")]
     StartNotFinite {
         /// Number of the point.
@@ -109,10 +109,10 @@ pub enum EmbeddingError {
         /// Number of the component.
         component: usize,
     },
-    /// No sweep leaves the start 0.
+    /// All coordinates of the start are 0, which no sweep changes.
     #[error("the start is 0 for all points, a saddle that no sweep leaves; start from classical scaling or at random")]
     StartAtSaddle,
-    /// There must be more points than dimensions.
+    /// There are not more points than dimensions.
     #[error("{points} points do not span {dimensions} dimensions")]
     TooFewPoints {
         /// Number of points.
@@ -120,7 +120,7 @@ pub enum EmbeddingError {
         /// Number of dimensions asked for.
         dimensions: usize,
     },
-    /// The graph of nearest neighbours falls into pieces, between which there is no distance.
+    /// The graph of nearest neighbours is in several pieces, between which there is no distance.
     #[error(
         "the graph of {neighbours} nearest neighbours falls into {pieces} pieces, the largest of {largest} of the \
          {points} points; {}, or embed each piece by itself",
@@ -135,7 +135,7 @@ pub enum EmbeddingError {
         points: usize,
         /// Number of points in the largest piece.
         largest: usize,
-        /// The least number of neighbours that connects them, where one was found.
+        /// The least number of neighbours that connects the points, if one was found.
         enough: Option<usize>,
     },
     /// The matrix of all pairs does not fit in memory.
@@ -147,20 +147,20 @@ pub enum EmbeddingError {
         /// Number of points.
         points: usize,
     },
-    /// New points do not have as many numbers as the fitted ones ask for.
+    /// A row of new points does not have as many values as the fitted points require.
     #[error("expected {expected} {what}, found {found}")]
     WrongColumns {
         /// Number needed.
         expected: usize,
-        /// What they are.
+        /// What the values are.
         what: &'static str,
         /// Number given.
         found: usize,
     },
-    /// The eigenvalues of the double-centred distances could not be had.
+    /// The eigenvalues of the double-centred distances could not be computed.
     #[error("the eigenvalues of the double-centred distances could not be computed")]
     NoEigenvalues,
-    /// Asked to stop.
+    /// The caller asked to stop, or memory ran out.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }

@@ -2,15 +2,15 @@
 
 use super::error::EmbeddingError;
 
-/// How the distances of points are measured.
+/// How the distances between points are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum PointMetric {
-    /// Straight (paper, equation 5).
+    /// In a straight line (equation 5 of the paper).
     Euclidean,
-    /// Along the graph of nearest neighbours, by Dijkstra (13); the paper takes 12.
+    /// Along the graph of nearest neighbours, by Dijkstra's algorithm (equation 13). The paper takes 12 neighbours.
     Geodesic {
-        /// Number of neighbours that a point is joined to, at least.
+        /// Least number of nearest neighbours that each point is joined to.
         neighbours: usize,
     },
 }
@@ -27,19 +27,19 @@ pub enum EmbedInput<'a> {
         p: usize,
         /// The n×p coordinates.
         data: &'a [f64],
-        /// How far apart they are.
+        /// How the distances between the points are measured.
         metric: PointMetric,
     },
-    /// An n×n matrix of distances, row by row (13). An asymmetric one is replaced by the mean with
-    /// its transpose; the diagonal is ignored. The triangle inequality is not asked for.
+    /// An n×n matrix of distances (equation 13), row by row. An asymmetric matrix is replaced by its mean with its
+    /// transpose. The diagonal is ignored. Distances need not satisfy the triangle inequality.
     Distances {
         /// Number of points.
         n: usize,
         /// The n×n distances.
         data: &'a [f64],
     },
-    /// An n×n matrix of affinities in [0, 1], row by row. An asymmetric one is replaced by the mean with its
-    /// transpose, which is all that the likelihood (4) sees of it; the diagonal is ignored, and so is the kernel width.
+    /// An n×n matrix of affinities in [0, 1], row by row. An asymmetric matrix is replaced by its mean with its transpose,
+    /// on which alone the likelihood (equation 4) depends. The diagonal is ignored, and so is the kernel width.
     Affinities {
         /// Number of points.
         n: usize,

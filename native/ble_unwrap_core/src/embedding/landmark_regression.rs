@@ -39,9 +39,9 @@ const CHUNK: usize = 64;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Evidence {
-    /// Squared distances.
+    /// Their distance. It is squared internally: [`place`](super::place()) takes distances that are not squared.
     SquaredDistances,
-    /// Affinities.
+    /// Their affinity.
     Affinities,
 }
 

@@ -1,14 +1,14 @@
-//! Bernoulli logistic embedding, the paper's sections 3 and 4: coordinates in few dimensions for points of any kind, from the
-//! points themselves, from their distances or from affinities.
+//! Bernoulli logistic embedding, as in sections 3 and 4 of the paper: it gives coordinates in few dimensions to points of
+//! any kind, from the points themselves, from their distances, or from affinities.
 //!
-//! [`embed()`] fits the model to all pairs of points, or to landmarks among which it then places the others. [`place`] and
-//! [`Embedding::transform`] place further points. [`unwrap`](crate::unwrap()) embeds each chart by the same model from the
-//! geodesic distances of its landmarks.
+//! [`embed()`] fits the model to all pairs of points, or to landmarks, among which it then places the other points.
+//! [`place`] and [`Embedding::transform`] place new points. [`unwrap`](crate::unwrap()) embeds each chart by the same
+//! model, from the geodesic distances of its landmarks.
 //!
 //! # Terms
-//! **Affinity** p_ij: how strongly two points belong together, from their distance through a
-//! **kernel** of **width** σ. **Landmarks**: the k points the distances are measured from. **Gauge**: what
-//! distances leave open (side, direction, place, and for the printed model scale).
+//! **Affinity** p_ij: a number from 0 to 1 that says how strongly points i and j belong together. A **kernel** of **width**
+//! σ computes it from their distance. **Landmarks**: the k points from which distances are measured. **Gauge**: what
+//! distances do not determine: reflection, rotation and translation, and for the printed model the scale.
 //!
 //! # References
 //! Bernoulli embedding model and its application in texture mapping, 2006 ("the paper"), sections

@@ -58,7 +58,8 @@ impl Placer {
     }
 }
 
-/// Landmarks as plain arrays, which outlive the [`Embedding`](super::Embedding) that they come from.
+/// The landmarks of an embedding as plain arrays. They can be kept after the [`Embedding`](super::Embedding) that they come
+/// from is gone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FittedLandmarks<'a> {
     /// The model.
@@ -69,9 +70,10 @@ pub struct FittedLandmarks<'a> {
     pub coordinates: &'a [f64],
     /// The k intercepts of the default model; empty for the others.
     pub intercepts: &'a [f64],
-    /// For Isomap the mean squared distance of all landmarks, itself included, to each; empty for the others.
+    /// For Isomap, the mean of the squared distances from all landmarks, itself included, to each of the k landmarks; empty
+    /// for the other models.
     pub mean_squared: &'a [f64],
-    /// The kernel width σ, a squared distance; 1 for affinities. Isomap does not use it.
+    /// The kernel width σ, in units of squared distance; 1 for affinities. Isomap does not use it.
     pub sigma: f64,
     /// Affinities below this count as 0; 0 keeps all.
     pub truncation: f64,
@@ -117,16 +119,17 @@ impl FittedLandmarks<'_> {
     }
 }
 
-/// Places `m` points by their distances (not squared) or affinities to k landmarks: m×q coordinates, row by row, as
-/// [`Embedding::transform`](super::Embedding::transform) does, which has the landmarks from the fit.
+/// Places `m` points by what is `known` of them: m rows, each with the point's distances (not squared) or affinities to the
+/// k landmarks. The result is m×q coordinates, row by row, as from [`Embedding::transform`](super::Embedding::transform),
+/// which keeps the landmarks of the fit itself.
 ///
-/// Deterministic for any number of threads. O(kq²) a point.
+/// The result is the same for any number of threads. O(kq²) for each point.
 ///
 /// # Errors
-/// [`EmbeddingError::WrongLength`] unless there are m·k values, and k intercepts or means where the model has them;
-/// [`EmbeddingError::InvalidSetting`]; [`EmbeddingError::TooFewPoints`] without landmarks; [`EmbeddingError::NotFinite`]
-/// names the landmark; [`EmbeddingError::DistanceOutOfRange`] and [`EmbeddingError::AffinityOutOfRange`] name the first bad
-/// value; cancelled.
+/// [`EmbeddingError::WrongLength`] unless there are m·k values, and k intercepts or mean squared distances where the model
+/// has them; [`EmbeddingError::InvalidSetting`]; [`EmbeddingError::TooFewPoints`] without landmarks;
+/// [`EmbeddingError::NotFinite`], which names the landmark; [`EmbeddingError::DistanceOutOfRange`] and
+/// [`EmbeddingError::AffinityOutOfRange`], which name the first bad value; [`EmbeddingError::Cancelled`].
 pub fn place(
     known: &[f64],
     m: usize,

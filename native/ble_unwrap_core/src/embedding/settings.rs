@@ -13,16 +13,17 @@ const DEFAULT_RELATIVE_WIDTH: f64 = 0.2;
 /// none, and half its triangles at σ = 0.3 or 1 times the mean squared distance).
 const PRINTED_MEAN_AFFINITY: f64 = 0.57;
 
-/// How distances become positions.
+/// The model by which distances become positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Model {
-    /// Bernoulli logistic embedding with intercepts and the logistic kernel: exact on developable charts.
+    /// Bernoulli logistic embedding with intercepts and the logistic kernel. It is exact on charts that unroll into the
+    /// plane.
     Default,
-    /// Bernoulli logistic embedding as printed: no intercepts, Gaussian kernel. Folds even flat sheets: of the
-    /// triangles of a square of 1,000 vertices it flips 8 %, of a 3:1 rectangle half.
+    /// Bernoulli logistic embedding as printed in the paper: with the Gaussian kernel and without intercepts. It folds even
+    /// flat sheets: it flips 8 % of the triangles of a square of 1,000 vertices, and half of those of a 3:1 rectangle.
     Paper,
-    /// Classical scaling, which fits no likelihood.
+    /// Classical scaling of the distances (Isomap); no likelihood is fitted.
     Isomap,
 }
 
@@ -41,13 +42,13 @@ impl Model {
     }
 }
 
-/// Where the fit starts.
+/// Where the fit starts from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Initial {
-    /// Classical scaling.
+    /// Classical scaling of the distances.
     Mds,
-    /// Normal with deviation ½ in each coordinate, from the seed.
+    /// Normally distributed coordinates with standard deviation ½, drawn from the seed.
     Random,
 }
 
@@ -61,18 +62,18 @@ choices!(Initial {
 pub struct EmbeddingSettings {
     /// The model.
     pub model: Model,
-    /// Kernel width σ as a multiple of the mean squared distance; positive. `None`: 0.2 for the default
-    /// model, for the printed one whatever makes the mean affinity 0.57.
+    /// Kernel width σ as a multiple of the mean squared distance; positive. `None` stands for 0.2 with the default model;
+    /// with the printed model, σ is then chosen so that the mean affinity is 0.57.
     pub kernel_width: Option<f64>,
-    /// Relaxation ω, inside (0, 2).
+    /// Over-relaxation ω of the updates, between 0 and 2, both excluded.
     pub relaxation: f64,
-    /// Most sweeps.
+    /// Greatest number of sweeps over all points.
     pub max_sweeps: usize,
-    /// Stop once a sweep changes the log-likelihood by less than this share of it.
+    /// The fit stops once a sweep changes the log-likelihood by less than this share of it.
     pub tolerance: f64,
-    /// Serial or parallel updates.
+    /// Whether points are updated one after another or all at once.
     pub update: Update,
-    /// The start.
+    /// Where the fit starts from.
     pub initial: Initial,
 }
 
@@ -91,14 +92,17 @@ impl Default for EmbeddingSettings {
 }
 
 impl EmbeddingSettings {
-    /// The paper's method as printed: its model from a seeded random start. ω = 1.7 is the best for the bound ¼.
+    /// The paper's method as printed: its model, from a random start drawn from the seed. The relaxation is ω = 1.7, which
+    /// is the best with the bound ¼ that the paper uses for q(1 − q).
     #[must_use]
     pub fn paper() -> Self {
         Self { model: Model::Paper, kernel_width: None, relaxation: 1.7, initial: Initial::Random, ..Self::default() }
     }
 
+    /// Checks all parameters.
+    ///
     /// # Errors
-    /// [`EmbeddingError::InvalidSetting`] names the first parameter out of range.
+    /// [`EmbeddingError::InvalidSetting`], which names the first parameter that is out of range.
     pub fn validate(&self) -> Result<(), EmbeddingError> {
         self.fit_options().validate()?;
         self.width().validate(self.kernel())

@@ -14,37 +14,38 @@ const FIRST_TRY: usize = 8;
 /// Pieces that the text names, the largest one apart.
 const NAMED: usize = 5;
 
-/// A piece of a graph.
+/// A connected piece of a neighbourhood graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Piece {
-    /// Number of points.
+    /// Number of points in the piece.
     pub size: usize,
-    /// The first of them.
+    /// The point of the piece with the lowest number.
     pub point: usize,
 }
 
-/// How a point cloud hangs together by the edges to nearest neighbours. As a text it names the pieces and says what
-/// connects them.
+/// How the points of a cloud are connected by the edges to their nearest neighbours. Displayed as text, it names the pieces
+/// and says what would connect them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Connectivity {
-    /// Neighbours of each point.
+    /// Number of neighbours that each point is joined to.
     pub neighbours: usize,
-    /// The pieces of their graph, the largest first, of equally large ones that of lower index. A small piece is
-    /// a cluster of outliers: more than `neighbours` of them, since fewer have neighbours elsewhere.
+    /// The connected pieces of the neighbourhood graph, the largest first; equally large pieces are in the order of their
+    /// `point`. A small piece is a cluster of outliers. It has more points than `neighbours`, since a point of a smaller
+    /// one would have neighbours elsewhere.
     pub pieces: Vec<Piece>,
     /// Points with a coordinate that is not finite. They are in no piece.
     pub nowhere: Vec<usize>,
-    /// The least number of neighbours that connects all points, if there is one up to `tried`; `neighbours` itself if
-    /// that does.
+    /// The least number of neighbours that connects all points, if some number up to `tried` does; equal to `neighbours` if
+    /// that number does.
     pub enough: Option<usize>,
-    /// The largest number of neighbours looked at.
+    /// The largest number of neighbours that was tried.
     pub tried: usize,
 }
 
 impl Connectivity {
-    /// Whether there is one piece at most.
+    /// Whether all points with finite coordinates are in one piece.
     #[must_use]
     pub fn is_connected(&self) -> bool {
         self.pieces.len() <= 1
@@ -75,7 +76,7 @@ impl fmt::Display for Connectivity {
         }
         if let [first, ..] = self.nowhere[..] {
             let count = self.nowhere.len();
-            write!(f, "; {count} {} of no finite place apart, the first point {first}", points(count))?;
+            write!(f, "; {count} {} without finite coordinates left out, the first is point {first}", points(count))?;
         }
         Ok(())
     }
@@ -216,7 +217,7 @@ mod tests {
         assert_eq!(
             found.to_string(),
             "the edges to 3 neighbours leave 43 points in 3 pieces: 30 points about point 0, 8 about 30, 5 about 39; \
-             8 neighbours would connect them; 1 point of no finite place apart, the first point 38"
+             8 neighbours would connect them; 1 point without finite coordinates left out, the first is point 38"
         );
         let none = judge(&points, 1, 3, 7);
         assert_eq!((none.enough, none.tried), (None, 7));

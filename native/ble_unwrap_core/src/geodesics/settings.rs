@@ -6,12 +6,12 @@ use crate::choice::choices;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Metric {
-    /// Fast marching across triangles. On curved surfaces its error is of first order in the edge length: 0.1 to 0.4 % on
-    /// average and up to 3 % at single vertices of meshes of some thousand; none to speak of where the surface unrolls and
-    /// the straight path meets no boundary.
+    /// Fast marching across triangles. On curved surfaces its error is proportional to the edge length: 0.1 to 0.4 % on
+    /// average, and up to 3 % at single vertices, for meshes of some thousand vertices. There is practically no error where
+    /// the surface unrolls into the plane and the straight path does not meet the boundary.
     FastMarching,
-    /// Shortest paths along edges: an upper bound, some 5 to 9 % too long on average where triangles are well shaped, and
-    /// without limit where they are not. For comparison.
+    /// Shortest paths along edges, for comparison. They are never too short; they are some 5 to 9 % too long on average
+    /// where triangles are well shaped, and without limit where triangles are not.
     Dijkstra,
 }
 
@@ -25,31 +25,32 @@ choices!(Metric {
 pub struct GeodesicSettings {
     /// How distances are measured.
     pub metric: Metric,
-    /// Landmarks a vertex: the paper's α (section 5).
+    /// Number of landmarks divided by the number of vertices: the paper's α (section 5).
     pub landmark_fraction: f64,
-    /// At least so many landmarks, where there are as many vertices.
+    /// Least number of landmarks. If a mesh has fewer vertices than this, all of them are landmarks.
     pub landmark_min: usize,
-    /// At most so many landmarks.
+    /// Greatest number of landmarks.
     pub landmark_max: usize,
 }
 
 impl Default for GeodesicSettings {
-    /// The paper's fraction, kept between 48 (fewer lose accuracy on small charts) and 64 (more
-    /// gain nothing once stretch is minimised).
+    /// The paper's fraction, but at least 48 landmarks, since fewer lose accuracy on small charts, and at most 64, since
+    /// more gain nothing once stretch is minimised.
     fn default() -> Self {
         Self { metric: Metric::FastMarching, landmark_fraction: 0.01, landmark_min: 48, landmark_max: 64 }
     }
 }
 
 impl GeodesicSettings {
-    /// The paper's: 1 % of the vertices, however many. Three are needed to span a plane.
+    /// The paper's fraction, 1 % of the vertices, without an upper limit. At least three landmarks are needed to span a
+    /// plane.
     #[must_use]
     pub fn paper() -> Self {
         Self { landmark_min: 3, landmark_max: usize::MAX, ..Self::default() }
     }
 
-    /// Number of landmarks for a mesh: ⌈αn⌉ within the bounds, never more than `vertex_count`. A
-    /// fraction that is no number counts as 0.
+    /// Number of landmarks for a mesh of n vertices: ⌈αn⌉, raised or lowered to the bounds, and never more than n. A
+    /// fraction that is NaN counts as 0.
     #[must_use]
     pub fn landmark_count(&self, vertex_count: usize) -> usize {
         // A cast from float to integer saturates, and takes NaN to 0.

@@ -1,9 +1,10 @@
 //! Memory: what is left of it, and how a refusal reaches the user as an error.
 //!
-//! What a call computes never depends on the memory that is free: it has its one result, or it ends with [`OutOfMemory`].
-//! Three nets lie under each other. A call estimates what it will need and looks whether that is there before it begins. Large
-//! arrays are asked for in a way that can fail ([`required`], which hosts may use for arrays of their own). And an allocator that had to fall back on its reserve says so by
-//! [`note_refusal`], upon which every computation under way stops at its next look at [`Progress`](crate::Progress).
+//! What a call computes never depends on how much memory is free: the call returns its one result, or it ends with
+//! [`OutOfMemory`]. This is ensured in three ways. A call estimates how much memory it will need, and compares this with
+//! what is available before it begins. Large arrays are allocated in a way that can fail ([`required`], which hosts may use
+//! for arrays of their own). And an allocator that had to fall back on a reserve reports this by [`note_refusal`]; every
+//! computation under way then stops the next time it looks at its [`Progress`](crate::Progress).
 
 mod container;
 mod last_cache;
@@ -15,11 +16,11 @@ use thiserror::Error;
 
 pub(crate) use last_cache::last_cache;
 
-/// The computation needs more memory than there is; nothing was produced.
+/// The computation needs more memory than there is, and nothing was produced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum OutOfMemory {
-    /// Found before the work began.
+    /// The lack of memory was found before the work began.
     #[error(
         "not enough memory: this takes about {}, and {} are left; close something else, give the mesh in parts, or lower \
          the texture size or the number of landmarks",
@@ -27,9 +28,9 @@ pub enum OutOfMemory {
         text(*available)
     )]
     Foreseen {
-        /// What the work takes, in bytes: an estimate on the safe side.
+        /// What the work takes, in bytes: an estimate that is rather too high than too low.
         needed: u64,
-        /// What is left to this process, in bytes.
+        /// The memory that this process can still get, in bytes.
         available: u64,
     },
     /// An allocation failed.
@@ -65,11 +66,12 @@ pub(crate) fn require(needed: u64) -> Result<(), OutOfMemory> {
     }
 }
 
-/// An empty vector with room for so many elements, for arrays whose size a caller chooses freely: if they take more than
-/// the platform says is left they are not asked for.
+/// An empty vector with room for `count` elements, for arrays whose size a caller chooses freely. If the array takes more
+/// memory than the platform says is left, no allocation is tried.
 ///
 /// # Errors
-/// [`OutOfMemory::Foreseen`]; [`OutOfMemory::Refused`], also where the size overflows.
+/// [`OutOfMemory::Foreseen`] if the platform says that too little is left; [`OutOfMemory::Refused`] if the allocation
+/// fails, or if the size in bytes overflows.
 pub fn required<T>(count: usize) -> Result<Vec<T>, OutOfMemory> {
     require((count as u64).saturating_mul(size_of::<T>() as u64))?;
     reserve(count)
@@ -135,8 +137,9 @@ fn soft_limit(text: &str, name: &str) -> Option<u64> {
 static REFUSALS: AtomicU64 = AtomicU64::new(0);
 static REFUSED_BYTES: AtomicU64 = AtomicU64::new(0);
 
-/// For an allocator: so many bytes were refused, and it had to give its reserve in their place. Every computation under
-/// way in this process ends with [`OutOfMemory::Refused`] soon. Neither allocates nor blocks.
+/// Called by an allocator to report that `bytes` bytes were refused and that it had to use its reserve instead. Every
+/// computation under way in this process soon ends with [`OutOfMemory::Refused`]. This function neither allocates nor
+/// blocks.
 pub fn note_refusal(bytes: u64) {
     REFUSED_BYTES.store(bytes, Ordering::Relaxed);
     REFUSALS.fetch_add(1, Ordering::Release);

@@ -7,27 +7,28 @@ use thiserror::Error;
 use crate::error_kind::ErrorKind;
 use crate::progress::Cancelled;
 
-/// Polygons as flat arrays, as Blender and most exchange formats keep them.
+/// A polygon mesh as flat arrays, as Blender and most exchange formats keep it.
 ///
-/// Face `f` has the corners `face_offsets[f]..face_offsets[f + 1]`, each of which names a vertex.
-/// Anything may be wrong with the arrays: every function that takes them checks all of them.
+/// Face `f` has the corners `face_offsets[f]..face_offsets[f + 1]`, each of which names a vertex. The arrays need not be
+/// valid: every function that takes them checks all of them.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MeshInput<'a> {
     /// Coordinates of the vertices, in any unit.
     pub positions: &'a [[f64; 3]],
     /// The vertex of each corner.
     pub corner_vertices: &'a [i32],
-    /// First corner of each face, and the number of corners at the end; may be empty without faces.
+    /// The first corner of each face, and at the end the number of corners. May be empty if there are no faces.
     pub face_offsets: &'a [i32],
-    /// Triangles by corner, in any order, that together triangulate every face. Made if absent.
+    /// Triangles as corner numbers, in any order, that together triangulate every face. Where absent, the faces are
+    /// triangulated by this library.
     pub corner_triangles: Option<&'a [[i32; 3]]>,
-    /// Pairs of vertices whose edge is to be cut.
+    /// Pairs of vertices. The edge between the two is always a seam.
     pub seams: &'a [[i32; 2]],
-    /// Pairs of vertices whose edge is a good place for the border of a chart, where one is needed.
+    /// Pairs of vertices. The edge between the two is a good place for a seam, where one is needed.
     pub guides: &'a [[i32; 2]],
 }
 
-/// Why a mesh cannot be unwrapped at all. Numbers count from 0, as the arrays do.
+/// Why a mesh cannot be unwrapped at all. Numbers of elements count from 0, as the arrays do.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum MeshError {
@@ -47,7 +48,7 @@ pub enum MeshError {
         /// Number of corners.
         corners: usize,
     },
-    /// Corners, but not a single offset.
+    /// There are corners, but no offsets.
     #[error("there are {corners} corners, but no face offsets; give one offset a face and the number of corners last")]
     OffsetsMissing {
         /// Number of corners.
@@ -63,7 +64,7 @@ pub enum MeshError {
         /// The offset after it.
         end: i32,
     },
-    /// A face of two corners, one or none.
+    /// A face has fewer than three corners.
     #[error("face {face} has {corners} corners; remove it or give it at least 3")]
     TooFewCorners {
         /// The face.
@@ -133,17 +134,17 @@ pub enum MeshError {
         /// Number of vertices.
         vertex_count: usize,
     },
-    /// More elements than 31-bit indices can name.
+    /// There are more elements of one kind than can be numbered.
     #[error("the mesh has {count} {element}, more than the {limit} that can be numbered; split it into several meshes")]
     TooLarge {
-        /// What there is too much of, in the plural.
+        /// The kind of element, in the plural.
         element: &'static str,
-        /// How many.
+        /// How many there are.
         count: usize,
-        /// How many there may be.
+        /// How many there can be.
         limit: usize,
     },
-    /// Every face has a vertex whose coordinates are no numbers.
+    /// Every face has a vertex whose coordinates are not finite.
     #[error(
         "every face has a vertex with non-finite coordinates, such as vertex {vertex} of face {face}; correct the coordinates"
     )]

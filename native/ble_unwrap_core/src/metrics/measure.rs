@@ -29,82 +29,88 @@ const OF_TRIANGLE: u64 = 1024;
 /// How far outside the unit square coordinates may lie before the layout counts as out of range.
 const RANGE_SLACK: f64 = 1e-5;
 
-/// The figures of one chart.
+/// The measures of one chart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ChartMeasures {
-    /// Lowest triangle of the chart.
+    /// The triangle of the chart that has the lowest number.
     pub first_triangle: usize,
-    /// The label given for that triangle.
+    /// The label that was given for that triangle.
     pub label: i32,
     /// Number of triangles.
     pub faces: usize,
-    /// Share of the measured surface.
+    /// Area of the chart on the surface, divided by the area of all measured triangles.
     pub area_share: f64,
     /// L2 stretch at the chart's best scale; NaN where nothing could be measured.
     pub l2: f64,
 }
 
-/// The figures of a layout. Distortions are weighted by surface area over the *measured* triangles:
-/// with finite UVs and degenerate neither on the surface nor in UV; NaN if there are none. A flipped
-/// triangle enters them with the absolute value of its area.
+/// The measures of a layout.
+///
+/// Distortions are means over the *measured* triangles, weighted by area on the surface; they are NaN if there are no such
+/// triangles. A triangle is measured if its UVs are finite and it is degenerate neither on the surface nor in UV. A flipped
+/// triangle counts with the absolute value of its area.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Measures {
-    /// Charts: sets of triangles connected over UV edges.
+    /// Number of charts: sets of triangles that are connected over edges in UV.
     pub charts: usize,
-    /// Islands: charts connected over UV vertices. Gaps and overlaps "between" are between islands.
+    /// Number of islands: sets of charts that are connected over vertices in UV. Gaps, and `overlaps_between`, are between
+    /// islands.
     pub islands: usize,
-    /// All triangles.
+    /// Number of triangles.
     pub faces: usize,
-    /// Triangles without a finite UV at each corner.
+    /// Number of triangles that do not have a finite UV at each corner.
     pub unmapped_faces: usize,
-    /// Of these, triangles whose label promises a UV, but which have NaN or an infinity there.
+    /// Number of those `unmapped_faces` whose label says that they have UVs, although a UV is NaN or infinite.
     pub nonfinite_faces: usize,
-    /// Triangles degenerate on the surface (or with a vertex that is not finite).
+    /// Number of triangles that are degenerate on the surface, or have a vertex that is not finite.
     pub degenerate_faces: usize,
-    /// Triangles degenerate in UV that are not on the surface: their stretch is infinite and left out.
+    /// Number of triangles that are degenerate in UV but not on the surface. Their stretch is infinite, and is left out.
     pub uv_degenerate_faces: usize,
     /// L2 stretch at the best scale of the whole layout; at least 1.
     pub l2: f64,
     /// L2 stretch with every chart at its own best scale.
     pub l2_chart_scale: f64,
-    /// L2 stretch of the worst chart at its best scale, charts under 1e-4 of the surface aside (under a hundredth of the
-    /// largest, where that has less than a hundredth of the surface).
+    /// L2 stretch of the worst chart at its best scale. Charts with less than 1e-4 of the surface are left out; if even the
+    /// largest chart has less than a hundredth of the surface, those with less than a hundredth of its area are left out
+    /// instead.
     pub l2_worst_chart: f64,
-    /// Label of the lowest triangle of that chart.
+    /// Label of the triangle with the lowest number in the worst chart.
     pub worst_chart: Option<i32>,
-    /// L-infinity stretch: the largest singular value of any UV→surface map, at the layout's scale.
+    /// L-infinity stretch: the largest singular value of the map from UV to the surface, over all triangles, at the
+    /// layout's scale.
     pub l_infinity: f64,
-    /// Mean of ½(σ₁/σ₂ + σ₂/σ₁); 1 is conformal.
+    /// Mean of ½(σ₁/σ₂ + σ₂/σ₁), where σ₁ and σ₂ are the singular values of a triangle's map; 1 means conformal.
     pub angle_distortion: f64,
-    /// Mean of ½(ρ + 1/ρ), ρ the area ratio at the layout's scale; 1 is equal area.
+    /// Mean of ½(ρ + 1/ρ), where ρ is the ratio of a triangle's areas on the surface and in UV at the layout's scale; 1
+    /// means that areas are kept.
     pub area_distortion: f64,
-    /// Triangles oriented against the majority (by surface area) of their chart, after making the
-    /// winding of the input consistent inside the chart.
+    /// Number of triangles whose orientation in UV differs from that of most of their chart (by area on the surface), once
+    /// the triangles of the chart have been oriented consistently on the surface.
     pub flips: usize,
-    /// Pairs of triangles that share more than 1e-9 of the layout's box.
+    /// Number of pairs of triangles that share more than 1e-9 of the area of the layout's bounding box.
     pub overlaps: u64,
-    /// Of these, pairs in different islands.
+    /// Number of those pairs whose triangles are in different islands.
     pub overlaps_between: u64,
-    /// False if there were too many overlaps to count (millions): the two figures above are then
-    /// lower bounds.
+    /// False if there were too many overlaps to count (millions). The two numbers above are then lower bounds.
     pub overlaps_complete: bool,
-    /// Length of the seams over the square root of the surface area. The mesh's own boundary is none.
+    /// Length of the seams, divided by the square root of the surface area. The boundary of the mesh itself does not count.
     pub seam_length: f64,
-    /// Length of the seams in units of the mesh.
+    /// Length of the seams in the unit of the mesh.
     pub seam_length_absolute: f64,
-    /// Covered share of the unit square; for a layout outside it, of its bounding square.
-    /// Area covered twice is taken off once a pair; meaningless where overlaps are not complete.
+    /// Share of the unit square that is covered; for a layout outside the unit square, share of its bounding square. Area
+    /// that a pair of triangles covers twice is subtracted once for each pair, so the value means nothing if
+    /// `overlaps_complete` is false.
     pub packing_efficiency: f64,
-    /// Least distance between two islands in texels; the search limit (eight, or twice the margin)
-    /// if it is more, 0 if boundaries cross.
+    /// Least distance between two islands in texels; 0 if boundaries cross. A distance above eight texels and above twice
+    /// the margin is given as the larger of these two values.
     pub gap_texels: f64,
-    /// False if the gap search hit its bound of work; the gap is then an upper bound.
+    /// False if there was too much to search. The gap is then an upper bound.
     pub gap_complete: bool,
-    /// Least and greatest coordinate along u and v; NaN without UVs.
+    /// Least and greatest coordinate along u, then along v; NaN if there are no UVs.
     pub uv_box: [[f64; 2]; 2],
-    /// Charts, numbered by lowest triangle.
+    /// The measures of each chart. Charts are in the order of their `first_triangle`.
     pub per_chart: Vec<ChartMeasures>,
 }
 

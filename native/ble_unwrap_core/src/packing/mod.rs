@@ -64,15 +64,15 @@ use crate::memory;
 use crate::progress::{Cancelled, Progress};
 use outline::Outline;
 
-/// Which rotations a chart may take. It is never mirrored.
+/// Which rotations a chart may take. Charts are never mirrored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Rotation {
     /// Any angle.
     Any,
-    /// Multiples of a quarter turn from the given pose.
+    /// Multiples of a quarter turn from the pose that is given.
     Quarter,
-    /// The given pose only.
+    /// Only the pose that is given.
     None,
 }
 
@@ -82,21 +82,23 @@ choices!(Rotation {
     None: "none", "None", "Charts stay as they were flattened, at whatever angle that is.";
 });
 
-/// How long to search for a dense placement. Neither looks at a clock: work is counted.
+/// How long to search for a dense placement. The search counts its work rather than looking at a clock, so the result does
+/// not depend on the speed of the machine; the times are typical ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Quality {
-    /// A twentieth of a second for up to some dozen charts, a fifth for some hundred.
+    /// Takes a twentieth of a second for up to some dozen charts, and a fifth of a second for some hundred.
     Fast,
-    /// Ten to twenty times as long, on finer grids; one to three hundredths of the texture more for many charts.
+    /// Takes ten to twenty times as long, on finer grids. With many charts, it covers one to three hundredths more of the
+    /// texture.
     High,
 }
 
 /// How charts are packed, and into which texture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PackSettings {
-    /// Least distance of two charts, and twice the least distance from the border, in texels. At
-    /// least 0, where charts may all but touch (a 64th of a texel stays).
+    /// Least distance between two charts in texels; half of it is kept to the border of the texture. At least 0; with 0,
+    /// charts may all but touch (a 64th of a texel stays between them).
     pub margin_texels: f64,
     /// Width of the texture in texels, 1 to [`PackSettings::LARGEST_SIZE`].
     pub width: u32,
@@ -112,7 +114,7 @@ impl PackSettings {
     /// Largest width or height of a texture.
     pub const LARGEST_SIZE: u32 = 32_768;
 
-    /// Two texels at 1024, quarter turns.
+    /// The paper's: a margin of two texels at a texture size of 1024, and quarter turns.
     #[must_use]
     pub fn paper() -> Self {
         Self { margin_texels: 2.0, width: 1024, height: 1024, rotation: Rotation::Quarter, quality: Quality::Fast }
@@ -131,7 +133,7 @@ impl PackSettings {
 }
 
 impl Default for PackSettings {
-    /// Four texels at 2048, any angle.
+    /// A margin of four texels at a texture size of 2048, and rotation by any angle.
     fn default() -> Self {
         Self { margin_texels: 4.0, width: 2048, height: 2048, rotation: Rotation::Any, quality: Quality::Fast }
     }
@@ -195,7 +197,7 @@ pub(crate) struct Packed {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PackError {
-    /// A texture without texels, or too large for f32 coordinates to tell fractions of a texel.
+    /// The texture has no texels, or is so large that single-precision coordinates cannot tell fractions of a texel apart.
     #[error(
         "a texture of {width} by {height} texels cannot be packed: choose 1 to {} each",
         PackSettings::LARGEST_SIZE
@@ -206,13 +208,13 @@ pub enum PackError {
         /// Height asked for.
         height: u32,
     },
-    /// Not a distance.
+    /// The margin is negative or not finite.
     #[error("a margin of {margin} texels is not a distance: choose 0 or more")]
     Margin {
         /// Margin asked for.
         margin: f64,
     },
-    /// The border alone takes the whole texture.
+    /// The margin that is kept to the border takes the whole texture.
     #[error(
         "a margin of {margin} texels leaves no room in a texture of {width} by {height}: choose a smaller margin or a larger texture"
     )]
@@ -224,7 +226,7 @@ pub enum PackError {
         /// Height of the texture.
         height: u32,
     },
-    /// Even with every chart a texel large they do not fit.
+    /// The charts do not fit even if each is only a texel large.
     #[error(
         "{charts} charts with a margin of {margin} texels do not fit a texture of {width} by {height}: choose a smaller margin or a larger texture, or make fewer charts"
     )]
@@ -238,27 +240,27 @@ pub enum PackError {
         /// Height of the texture.
         height: u32,
     },
-    /// A coordinate is not a number, infinite or beyond 1e150.
+    /// A coordinate is not finite, or is beyond 1e150 in size.
     #[error(
         "triangle {triangle} of chart {item} has a coordinate that is not finite or beyond 1e150: repair or leave out the chart"
     )]
     NotFinite {
-        /// The item.
+        /// The chart, numbered from 0.
         item: usize,
-        /// Its triangle.
+        /// The triangle, numbered within the chart.
         triangle: usize,
     },
     /// A triangle names a point that does not exist.
     #[error("triangle {triangle} of chart {item} names a point beyond the chart's {points}")]
     CornerOutOfRange {
-        /// The item.
+        /// The chart, numbered from 0.
         item: usize,
-        /// Its triangle.
+        /// The triangle, numbered within the chart.
         triangle: usize,
-        /// Number of points of the item.
+        /// Number of points of the chart.
         points: usize,
     },
-    /// Asked to stop.
+    /// The caller asked to stop, or memory ran out.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }

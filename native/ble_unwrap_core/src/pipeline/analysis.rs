@@ -1,4 +1,4 @@
-//! A mesh made ready to be unwrapped again and again.
+//! A mesh prepared for being unwrapped several times.
 
 use std::cmp::Reverse;
 use std::sync::Arc;
@@ -19,12 +19,12 @@ use super::tally::Tally;
 use super::{budget, component, finish, needs, ribbons};
 use crate::flattening::Rungs;
 
-/// A mesh and what was found out about it, for unwrapping it several times with different settings.
+/// A mesh, and what was found out about it, for unwrapping it several times with different settings.
 ///
-/// Guaranteed: [`Analysis::unwrap`] gives what [`unwrap`](crate::unwrap()) gives with the same mesh and settings, bit for
-/// bit (times apart), whatever was unwrapped before and by how many threads at once.
+/// Guaranteed: [`Analysis::unwrap`] returns what [`unwrap`](crate::unwrap()) returns for the same mesh and settings, bit
+/// for bit except for the measured times, whatever was unwrapped before and by how many threads at once.
 ///
-/// Not guaranteed: that a second call is faster, as it will be if little but the limit differs.
+/// Not guaranteed: that a second call is faster. It will be if hardly anything but the stretch limit differs.
 #[derive(Debug)]
 pub struct Analysis {
     positions: Vec<[f64; 3]>,
@@ -36,12 +36,12 @@ pub struct Analysis {
 }
 
 impl Analysis {
-    /// Copies the mesh and conditions it, as the settings it will be unwrapped with say: of these `weld` and `weld_distance`
-    /// count. O(n log n).
+    /// Copies the mesh and conditions it, which means making it an oriented manifold surface. Of the settings, only `weld`
+    /// and `weld_distance` matter here; [`Analysis::unwrap`] must be given the same. O(n log n).
     ///
     /// # Errors
     /// [`UnwrapError::Mesh`] if the arrays do not make a mesh; [`UnwrapError::Setting`] if a setting is out of its range;
-    /// cancelled.
+    /// [`UnwrapError::OutOfMemory`]; [`UnwrapError::Cancelled`].
     pub fn new(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -> Result<Self, UnwrapError> {
         progress.check()?;
         settings.validate()?;
@@ -58,13 +58,14 @@ impl Analysis {
         })
     }
 
-    /// Whether vertices at the same position count as one.
+    /// Whether vertices at the same position are welded, that is, count as one.
     #[must_use]
     pub fn weld(&self) -> bool {
         self.conditioning.weld
     }
 
-    /// How near to each other such vertices are; `None` for what single precision cannot tell apart.
+    /// The distance up to which vertices are welded; `None` stands for the one that [`Settings::weld_distance`] derives
+    /// from single precision.
     #[must_use]
     pub fn weld_distance(&self) -> Option<f64> {
         self.conditioning.weld_distance
@@ -76,10 +77,11 @@ impl Analysis {
         self.face_offsets.len().saturating_sub(1)
     }
 
-    /// As [`unwrap`](crate::unwrap()) of the mesh.
+    /// Unwraps the mesh, as [`unwrap`](crate::unwrap()) does.
     ///
     /// # Errors
-    /// As there; also if `settings.weld` or, with it, `settings.weld_distance` is not what the mesh was analysed with.
+    /// Those of [`unwrap`](crate::unwrap()); also [`UnwrapError::Setting`] if `settings.weld` or, where it is on,
+    /// `settings.weld_distance` is not what the mesh was analysed with.
     pub fn unwrap(&self, settings: &Settings, progress: &Progress) -> Result<Atlas, UnwrapError> {
         progress.check()?;
         settings.validate()?;

@@ -37,23 +37,25 @@ pub use analysis::Analysis;
 use analysis::Prepared;
 use memo::Run;
 
-/// Unwraps a mesh: cuts it into charts, flattens them under the stretch limit, packs them.
+/// Unwraps a mesh: cuts it into charts, flattens them under the stretch limit, and packs them into the unit square.
 ///
 /// Guaranteed for every result, checked exactly on the final single-precision values, and proven by its
-/// [`Certificate`](crate::Certificate): each face whose vertices are finite lies in exactly one chart; no triangle is flipped
-/// or without area; no chart overlaps itself or another; charts keep the margin. Where that cannot be proven the call fails.
-/// Every chart has an L2 stretch within
-/// `settings.stretch_limit` or is listed in the report (a single polygon may not flatten under it); where that limit is
-/// over the atlas, this holds for [`Settings::chart_limit`], and the whole is within the limit or the report warns. The
+/// [`Certificate`](crate::Certificate): each face whose vertices are all finite lies in exactly one chart; no triangle is
+/// flipped or without area; no chart overlaps itself or another; charts keep the margin. Where this cannot be proven, the
+/// call fails.
+///
+/// Every chart has an L2 stretch within `settings.stretch_limit`, or is listed in the report (a single polygon, which is
+/// never cut, may have more). Where [`Settings::limit_over`] is the atlas, a chart is held to [`Settings::chart_limit`]
+/// instead, and the whole layout is within `settings.stretch_limit`, or a warning in the report says that it is not. The
 /// result is the same, bit for bit, for any number of threads.
 ///
 /// Not guaranteed: the fewest charts or the shortest seams possible.
 ///
-/// Near-linear in the number of faces. Runs on rayon's current thread pool.
+/// The time is nearly proportional to the number of faces. The work is done on rayon's current thread pool.
 ///
 /// # Errors
-/// [`UnwrapError`]: invalid arrays, a setting out of range, charts that cannot keep the margin at the
-/// texture size, not enough memory, or cancelled. Nothing is produced then.
+/// [`UnwrapError`]: the arrays are invalid, a setting is out of range, the charts cannot keep the margin at the size of the
+/// texture, there is not enough memory, no layout could be proven, or the caller cancelled. Nothing is produced then.
 pub fn unwrap(input: &MeshInput<'_>, settings: &Settings, progress: &Progress) -> Result<Atlas, UnwrapError> {
     progress.check()?;
     settings.validate()?;

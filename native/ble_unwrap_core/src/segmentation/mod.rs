@@ -42,37 +42,40 @@ pub(crate) use straighten::straighten;
 /// Parameters of the segmentation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SegmentationSettings {
-    /// Most parts of the first split of a component (iso-charts: 10).
+    /// Greatest number of parts that a component is first split into (10 in iso-charts).
     pub first_parts: usize,
-    /// Most parts of every later split.
+    /// Greatest number of parts in every later split.
     pub later_parts: usize,
-    /// Width of the band that the minimum cut may move a border in: |d₁ − d₂| / (d₁ + d₂) for the
-    /// distances to the two representatives.
+    /// Width of the band within which the minimum cut may move a border between two parts. The band holds the places where
+    /// |d₁ − d₂| / (d₁ + d₂) is at most this, for the geodesic distances d₁ and d₂ to the representatives of the two parts.
     pub band: f64,
-    /// Share of length and creases in the cut's cost after the first split, 0 to 1; the rest looks at embedding errors.
+    /// Share of length and creases in the cost of a cut after the first split, from 0 to 1. The rest is the share of the
+    /// embedding errors.
     pub crease_share: f64,
-    /// How strongly borders are drawn to creases, 0 to 2: 0 not at all, 1 as iso-charts has it. A border along a side that
-    /// bends as much as the mean costs ½ to this power of one in a plane.
+    /// How strongly seams are drawn to creases, from 0 to 2: 0 means not at all, 1 is as in iso-charts. Where a seam along
+    /// an edge of a flat place costs 1, one along an edge that bends as much as the average edge costs ½ to the power of
+    /// this weight.
     pub crease_weight: f64,
-    /// How the two make up the cost.
+    /// How the crease term and the misfit term make up the cost.
     pub cost: CutCost,
 }
 
-/// What a cut costs where it runs: α stands for [`SegmentationSettings::crease_share`], the crease is 1 where the surface
-/// is flat and near 0 where it bends, the misfit is 1 in the mean.
+/// What a cut costs where it runs. In the formulas, α stands for [`SegmentationSettings::crease_share`]; "crease" is 1
+/// where the surface is flat and near 0 where it bends; "misfit" measures the embedding errors and is 1 on average.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CutCost {
-    /// α·crease + (1 − α)·misfit, as iso-charts has it. A crease then never costs less than the misfit's share, a third
-    /// of what a plane does, and cuts leave it for a slightly shorter way.
+    /// α·crease + (1 − α)·misfit, as in iso-charts. A crease then never costs less than the share of the misfit, which is a
+    /// third of the cost in a flat place, and cuts leave creases for a slightly shorter path.
     Sum,
-    /// crease·(α + (1 − α)·misfit): a crease is cheap whatever the embeddings say. On models with creases seams get
-    /// shorter (a car's 8.7 to 7.3), on some without a little longer.
+    /// crease·(α + (1 − α)·misfit). A crease is then cheap whatever the embedding errors are. On models with creases seams
+    /// get shorter (on a car their length falls from 8.7 to 7.3); on some models without creases they get a little longer.
     Product,
 }
 
 impl SegmentationSettings {
-    /// The largest [`crease_weight`](Self::crease_weight): beyond, folds cost less than the least capacity.
+    /// The largest [`crease_weight`](Self::crease_weight). With more, folds would cost less than the least capacity of an
+    /// edge in the minimum cut.
     pub const MOST_CREASE_WEIGHT: f64 = 2.0;
 }
 
@@ -90,7 +93,7 @@ impl Default for SegmentationSettings {
 }
 
 impl SegmentationSettings {
-    /// As iso-charts has it.
+    /// The cost of a cut as in iso-charts.
     #[must_use]
     pub fn paper() -> Self {
         Self { cost: CutCost::Sum, ..Self::default() }

@@ -2,33 +2,33 @@
 
 use std::fmt;
 
-/// The real numbers between two ends, each of which belongs to the interval or not.
+/// The real numbers between two ends. Each end may belong to the interval or be left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// The lower end.
     pub least: f64,
     /// Whether the lower end itself is left out.
     pub least_open: bool,
-    /// The upper end; infinite where there is none.
+    /// The upper end; infinite where there is no upper bound.
     pub most: f64,
     /// Whether the upper end itself is left out.
     pub most_open: bool,
 }
 
 impl Interval {
-    /// From `least` to `most`, both included.
+    /// The numbers from `least` to `most`, both included.
     #[must_use]
     pub const fn closed(least: f64, most: f64) -> Self {
         Self { least, least_open: false, most, most_open: false }
     }
 
-    /// Above `least` and at most `most`.
+    /// The numbers above `least` and at most `most`.
     #[must_use]
     pub const fn above(least: f64, most: f64) -> Self {
         Self { least, least_open: true, most, most_open: false }
     }
 
-    /// Above `least` and below `most`.
+    /// The numbers above `least` and below `most`.
     #[must_use]
     pub const fn between(least: f64, most: f64) -> Self {
         Self { least, least_open: true, most, most_open: true }
@@ -48,7 +48,7 @@ impl Interval {
 }
 
 impl fmt::Display for Interval {
-    /// For instance "above 0 and at most 1".
+    /// Writes the interval in words, for instance "above 0 and at most 1".
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {}", if self.least_open { "above" } else { "at least" }, self.least)?;
         if self.most.is_infinite() {

@@ -1,7 +1,8 @@
-//! Every parameter of the unwrapper, with the presets of practice, of the paper and of the method it is compared with.
+//! Every parameter of the unwrapper, with three presets: the default for practical work, the paper's method, and
+//! iso-charts, the method that the paper compares itself with.
 //!
-//! A setting is written in two places: its default (and what presets have instead) where its structure is, and all else,
-//! such as its range and what people are told about it, in the [`TABLE`].
+//! A setting is declared in two places. Its default, and the values that presets have instead, are where its structure is.
+//! Everything else, such as its range and the sentences that describe it to users, is in the [`TABLE`].
 
 mod interval;
 mod table;
@@ -28,16 +29,16 @@ const PAPER_TOGETHER_MAX: usize = 2_000;
 /// Most vertices of a patch whose distances to each other can be handled: 8 GB and minutes.
 pub(crate) const MOST_TOGETHER: usize = 20_000;
 
-/// The value of [`Settings::least_sewn`] that keeps charts without darts.
+/// The value of [`Settings::least_sewn`] from which on charts have no darts.
 pub const NEVER_SEWN: f64 = 1e3;
 
 /// What happens to the holes of a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Holes {
-    /// A chart may have several boundary loops.
+    /// A chart may have holes, that is, several boundary loops.
     Keep,
-    /// Every chart is cut to a topological disk, as the paper has it.
+    /// Every chart is cut open to a topological disk, as in the paper.
     Cut,
 }
 
@@ -50,9 +51,11 @@ choices!(Holes {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ChartScale {
-    /// The same area of texture for the same area of surface.
+    /// The same area of texture for the same area of surface, in all charts.
     Uniform,
-    /// More texture for stretched charts: √(E/A) of each chart, within [½, 2] of uniform.
+    /// More texture for stretched charts: texels per unit of length are multiplied by the square root of the chart's L2
+    /// stretch, which is √(E/A) for the integral E of the squared stretch over the area A of the chart, but by no less than
+    /// ½ and no more than 2.
     Stretch,
 }
 
@@ -67,8 +70,8 @@ choices!(ChartScale {
 pub enum LimitOver {
     /// The L2 stretch of every chart.
     Chart,
-    /// The L2 stretch of the whole atlas, as UVAtlas has it: the root of the area-weighted mean of the charts' squared L2
-    /// stretch. Single charts may have more, up to [`Settings::chart_limit`].
+    /// The L2 stretch of the whole atlas, as in UVAtlas: the square root of the mean of the charts' squared L2 stretch,
+    /// weighted by area. Single charts may have more, up to [`Settings::chart_limit`].
     Atlas,
 }
 
@@ -77,7 +80,7 @@ choices!(LimitOver {
     Atlas: "atlas", "Whole Atlas", "All charts together keep the limit, while some exceed it, up to fourfold above 1: fewer charts.";
 });
 
-/// Where the settings that are not given come from.
+/// Where the values of settings come from that are not given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Preset {
@@ -101,39 +104,42 @@ const SINGLE_CHARTS: f64 = 4.0;
 /// All settings of [`unwrap`](crate::unwrap()), grouped by stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Upper bound of the L2 stretch, above 1.
+    /// Upper bound of the L2 stretch; must be above 1, which is no stretch.
     pub stretch_limit: f64,
-    /// Of what: of every chart, or of all together.
+    /// Whether `stretch_limit` bounds the L2 stretch of every chart or that of all charts together.
     pub limit_over: LimitOver,
-    /// Whether vertices at the same position count as one. Off by default: an edge between two
-    /// vertices of the input is then a seam only if the result says so. Turn it on for data that
-    /// repeats vertices along seams of its own, as many file formats do.
+    /// Whether vertices at the same position are welded, that is, count as one. Off by default: an edge between two
+    /// vertices of the input is then a seam only if the result makes it one. Turn it on for data that repeats vertices
+    /// along its own seams, as many file formats do.
     pub weld: bool,
-    /// How near to each other such vertices are, in the unit of the input: 0 for exactly the same coordinates. `None` for
-    /// what single precision cannot tell apart: 2⁻²¹ of the diagonal of the bounding box or, if all coordinates are numbers
-    /// of single precision, of the greatest of them where that is larger; at most a hundredth of the mean side. Nothing
-    /// without `weld`.
+    /// The distance up to which vertices are welded, in the unit of the input; 0 welds only those with exactly the same
+    /// coordinates. `None` stands for a distance that single precision cannot resolve: 2⁻²¹ of the diagonal of the bounding
+    /// box, or, if all coordinates are numbers of single precision, of the greatest coordinate where that is larger, but at
+    /// most a hundredth of the mean length of an edge. Has no effect unless `weld` is on.
     ///
-    /// A group of vertices lies within the distance around one of them, so chains are broken up. Two vertices of one polygon
-    /// are never welded unless they coincide: no polygon loses a side by it, however long the distance.
+    /// All vertices of a welded group lie within this distance of one of them, so a long chain of close vertices does not
+    /// become a single vertex. Two vertices of one polygon are never welded unless they coincide: welding takes no side
+    /// from a polygon, however large the distance.
     pub weld_distance: Option<f64>,
-    /// Whether large components are cut on a coarse mesh first. Off, as in the paper's presets, patches are embedded by all
-    /// landmarks and ribbons stay whole, too.
+    /// Whether large components are first cut on a coarse copy of the mesh. When it is off, as in the paper's presets,
+    /// trial embeddings also use the full number of landmarks, and charts too long for the texture are not cut across.
     pub coarse: bool,
-    /// Whether neighbouring charts are joined again where their union stays under the limit, and crushed polygons at their
-    /// borders handed over.
+    /// Whether neighbouring charts are joined again where their union stays under the limit, and whether polygons at their
+    /// borders that come out crushed are handed over to the neighbouring chart.
     pub merge: bool,
-    /// Charts whose union would be over the limit are sewn along a part of their border, the rest being left as a dart,
-    /// where that part is at least this share of the square root of the smaller one's area: less for fewer charts and a
-    /// shorter seam, more for compact charts. From [`NEVER_SEWN`] on none are, nor are patches cut by darts or to
-    /// nets before they are split, nor crushed polygons handed over borders.
+    /// The least length of a border that is sewn. Two charts whose union would be over the limit are sewn along a part of
+    /// their common border, and the rest of the border stays open as a dart, if that part is at least this many times as
+    /// long as the square root of the smaller chart's area. Lower values give fewer charts and shorter seams; higher values
+    /// give compact charts. From [`NEVER_SEWN`] on no charts are sewn like this; patches are not cut open by darts or into
+    /// nets before they are split, either, and crushed polygons are not handed over.
     pub least_sewn: f64,
-    /// Holes of charts.
+    /// What happens to the holes of charts.
     pub holes: Holes,
-    /// Relative scale of charts.
+    /// How charts are scaled relative to each other.
     pub chart_scale: ChartScale,
-    /// Patches of at most so many vertices are embedded with all their vertices together, as the paper does, in
-    /// time and memory of the square of their number; larger ones by their landmarks. 0: always by landmarks.
+    /// Patches with at most so many vertices are embedded with all their vertices together, as in the paper, which takes
+    /// time and memory proportional to the square of that number. Larger patches are embedded by their landmarks. With 0,
+    /// all patches are embedded by landmarks.
     pub together_max: usize,
     /// Seed of every random choice.
     pub seed: u64,
@@ -150,7 +156,7 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// What an artist wants: the extended model, projected Newton, holes kept.
+    /// The settings for practical work: the extended model, projected Newton steps, and holes kept.
     fn default() -> Self {
         Self {
             stretch_limit: 1.1,
@@ -174,11 +180,12 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The paper as printed: landmarks, one vertex in a hundred, for cutting (section 5.1); its model from a random
-    /// start on all vertices of a patch together; Sander's line searches, disks, two texels at 1024.
+    /// The paper's method as printed. Its landmarks, one vertex in a hundred, are used for cutting (section 5.1); its model
+    /// is fitted from a random start to all vertices of a patch together; stretch is minimised by Sander's line searches;
+    /// charts are disks; the margin is two texels at a texture size of 1024.
     ///
-    /// Above 2,000 vertices a patch is embedded by its landmarks, and the others are placed by regression: all pairs would
-    /// not fit in time and memory.
+    /// A patch of more than 2,000 vertices is embedded by its landmarks, and its other vertices are placed by regression,
+    /// since all pairs of vertices would take too much time and memory.
     #[must_use]
     pub fn paper() -> Self {
         Self {
@@ -195,8 +202,8 @@ impl Settings {
         }
     }
 
-    /// What the paper is compared with: iso-charts (Zhou, Snyder, Guo, Shum 2004), the same pipeline and settings as
-    /// [`Settings::paper`] with Isomap in place of Bernoulli logistic embedding.
+    /// The method that the paper compares itself with: iso-charts (Zhou, Snyder, Guo, Shum 2004). The pipeline and the
+    /// settings are those of [`Settings::paper`], with Isomap in place of Bernoulli logistic embedding.
     #[must_use]
     pub fn iso_charts() -> Self {
         let paper = Self::paper();
@@ -217,8 +224,8 @@ impl Settings {
         ConditionOptions { weld: self.weld, weld_distance: self.weld_distance }
     }
 
-    /// The L2 stretch that a single chart may have: the limit, or where that is over the atlas 1 and four times what the
-    /// limit is above 1.
+    /// The L2 stretch that a single chart may have. This is `stretch_limit` itself, or, where the limit is over the atlas,
+    /// the value that is four times as far above 1.
     #[must_use]
     pub fn chart_limit(&self) -> f64 {
         match self.limit_over {
@@ -237,7 +244,8 @@ impl Settings {
         }
     }
 
-    /// Checks every range of the [`TABLE`], those of the settings that only Rust has, and that no two contradict each other.
+    /// Checks the range of every setting in the [`TABLE`] and of those that only Rust has, and that no two settings
+    /// contradict each other.
     ///
     /// # Errors
     /// [`UnwrapError::Setting`] with the first setting that is out of range.

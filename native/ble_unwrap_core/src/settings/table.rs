@@ -18,9 +18,9 @@ pub struct Setting {
     pub name: &'static str,
     /// The name on the screen.
     pub label: &'static str,
-    /// Which functions look at it.
+    /// Which functions take it.
     pub group: Group,
-    /// What it can be, and where it lies in [`Settings`].
+    /// What values it can have, and where its value is in [`Settings`].
     pub kind: Kind,
     /// The unit; empty where there is none.
     pub unit: &'static str,
@@ -31,45 +31,45 @@ pub struct Setting {
 /// Where a value lies in the settings.
 pub type Place<T> = fn(&mut Settings) -> &mut T;
 
-/// What a setting can be, its range, and where its value lies.
+/// What values a setting can have, their range, and where the value is in [`Settings`].
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
-    /// Yes or no.
+    /// True or false.
     Flag(Place<bool>),
-    /// A number.
+    /// A number in the interval.
     Real(Place<f64>, Interval),
-    /// A number, or `None` for what the text says.
+    /// A number in the interval, or `None`, which stands for what the text says.
     OptionalReal(Place<Option<f64>>, Interval, &'static str),
-    /// A whole number between the two, both included.
+    /// A whole number from the first to the second, both included.
     Whole(Place<usize>, [usize; 2]),
-    /// The same, or no limit, which is `usize::MAX`.
+    /// A whole number from the first to the second, both included, or no limit, which is `usize::MAX`.
     Limit(Place<usize>, [usize; 2]),
-    /// Any whole number of 64 bits.
+    /// Any unsigned whole number of 64 bits.
     Seed(Place<u64>),
-    /// Width and height in texels, each between the two.
+    /// Width and height in texels, each from the first number to the second, both included.
     Size(fn(&mut Settings) -> [&mut u32; 2], [u32; 2]),
-    /// One of a few, each with a word.
+    /// One of a few values, each of which has a word.
     Choice(fn(&mut Settings) -> &mut dyn Choice),
 }
 
-/// The value of a setting, whichever it is.
+/// The value of a setting of any kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value<'a> {
-    /// Of a flag.
+    /// The value of a [`Kind::Flag`].
     Flag(bool),
-    /// Of a number.
+    /// The value of a [`Kind::Real`] or [`Kind::OptionalReal`].
     Real(f64),
-    /// Of a whole number.
+    /// The value of a [`Kind::Whole`], [`Kind::Limit`] or [`Kind::Seed`].
     Whole(u64),
-    /// Width and height.
+    /// The width and height of a [`Kind::Size`].
     Size([u64; 2]),
-    /// Of a choice.
+    /// The word of a [`Kind::Choice`].
     Word(&'a str),
-    /// Of a number that is left to the library, or of a limit that is none.
+    /// A [`Kind::OptionalReal`] that is left to the library, or a [`Kind::Limit`] that does not limit anything.
     None,
 }
 
-/// The functions that take settings, by their names in Python. [`Function::Unwrap`] takes all.
+/// The functions that take settings, by their names in Python. [`Function::Unwrap`] takes all settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "they are documented where they are")]
 #[non_exhaustive]
@@ -122,31 +122,32 @@ impl Function {
     }
 }
 
-/// Settings that the same functions look at.
+/// Settings that are taken by the same functions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Group {
     /// How a surface is cut into charts.
     Charts,
-    /// How surfaces and clouds alike are cut.
+    /// How surfaces, and clouds as well, are cut into charts.
     Limit,
-    /// What counts as one vertex.
+    /// Which vertices count as one.
     Weld,
     /// How distances on surfaces are measured.
     Geodesics,
-    /// From how many landmarks.
+    /// How many landmarks there are.
     Landmarks,
-    /// Which model embeds.
+    /// Which model embeds points.
     Model,
-    /// How it is fitted.
+    /// How the model is fitted.
     Fit,
-    /// Where the fit starts; an argument of its own of [`Function::Embed`], which takes coordinates, too.
+    /// Where the fit starts from. [`Function::Embed`] has an argument of its own instead, which can also be an array of
+    /// coordinates.
     Start,
     /// How one patch of a surface becomes flat.
     Flattening,
     /// The texture that the result is for.
     Texture,
-    /// How charts lie in it.
+    /// How charts are placed in the texture.
     Packing,
 }
 
@@ -184,7 +185,7 @@ impl Group {
         }
     }
 
-    /// Whether a function looks at the settings of the group; for the others they are an error.
+    /// Whether a function takes the settings of the group. If it does not, giving it one is an error.
     #[must_use]
     pub fn concerns(self, function: Function) -> bool {
         use Function::{Analyse, Embed, Flatten, GeodesicDistances, Measure, Pack, Place, Unwrap, UnwrapPoints};
@@ -206,7 +207,7 @@ impl Group {
 }
 
 impl Setting {
-    /// The value in some settings.
+    /// The value that this setting has in `settings`.
     #[must_use]
     pub fn value(&self, settings: &Settings) -> Value<'static> {
         // The places are for writing, too; settings are a few hundred bytes.
@@ -226,7 +227,8 @@ impl Setting {
         }
     }
 
-    /// Takes a value; false, and nothing changed, where it is of another kind or out of range.
+    /// Gives this setting a value in `settings`. Returns false, and changes nothing, if the value is of another kind or out
+    /// of range.
     #[must_use]
     pub fn set(&self, settings: &mut Settings, value: Value<'_>) -> bool {
         match (self.kind, value) {
@@ -253,7 +255,8 @@ impl Setting {
         true
     }
 
-    /// What the setting may be, to complete "it must be", for instance "a number above 0 and at most 1".
+    /// What values the setting can have, in words that complete "it must be": for instance, "a number above 0 and at most
+    /// 1".
     #[must_use]
     pub fn expected(&self) -> String {
         let whole = |[least, most]: [u64; 2]| format!("a whole number from {least} to {most}");
@@ -273,7 +276,7 @@ impl Setting {
         }
     }
 
-    /// What `None` stands for, where the setting can be that.
+    /// What `None` stands for, if the setting can be `None`.
     #[must_use]
     pub fn none(&self) -> Option<&'static str> {
         match self.kind {
@@ -292,7 +295,7 @@ fn within<T: Copy + PartialOrd + TryFrom<u64>>(n: u64, [least, most]: [T; 2]) ->
     T::try_from(n).ok().filter(|n| (least..=most).contains(n))
 }
 
-/// Words in quotes as English lists them: `'a', 'b' or 'c'`.
+/// Words in quotes, listed as in an English sentence: `'a', 'b' or 'c'`.
 #[must_use]
 pub fn listed(words: &[&str]) -> String {
     let quoted: Vec<String> = words.iter().map(|word| format!("'{word}'")).collect();
@@ -315,24 +318,24 @@ impl std::fmt::Display for Value<'_> {
     }
 }
 
-/// A whole number that functions take beside the settings.
+/// A whole number that functions take besides the settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Argument {
     /// The name in Python and on the command line.
     pub name: &'static str,
     /// The name on the screen.
     pub label: &'static str,
-    /// The value that it has where it is not given.
+    /// The value where none is given.
     pub default: usize,
     /// The least and the greatest value.
     pub range: [usize; 2],
-    /// What it does.
+    /// What it does, in a sentence.
     pub sentence: &'static str,
 }
 
-/// How many points each point of a cloud is joined to. By 12, graph distances are 3 % too long on average, which the
-/// relaxation takes away; the paper names no number. Fewer than 4 do not tell a tangent plane; more than 256 do not fit in
-/// memory for the clouds that would need them.
+/// The number of nearest neighbours that each point of a cloud is joined to. With 12, graph distances are 3 % too long on
+/// average, which the relaxation of a chart corrects; the paper names no number. Fewer than 4 do not determine a tangent
+/// plane; more than 256 take too much memory for the clouds that would need them.
 pub const NEIGHBOURS: Argument = Argument {
     name: "neighbours",
     label: "Neighbours",
@@ -341,7 +344,8 @@ pub const NEIGHBOURS: Argument = Argument {
     sentence: "Each point of a cloud is joined to so many nearest points. More bridge gaps, fewer keep sheets apart.",
 };
 
-/// Threads of a call. The most is several times what the largest machines have, and far below what exhausts one.
+/// The number of threads of a call. The greatest allowed value is several times what the largest machines have, and far
+/// below what would exhaust a machine.
 pub const THREADS: Argument = Argument {
     name: "threads",
     label: "Threads",

@@ -9,24 +9,24 @@ use crate::memory;
 use crate::mesh::{self, ConditionOptions, MeshError, MeshInput, Surface, VertexId};
 use crate::progress::{Cancelled, Progress, Stage};
 
-/// Why there are no distances.
+/// Why geodesic distances could not be computed.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum DistancesError {
     /// The input arrays do not make a mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// A source is no vertex.
+    /// A source is not a vertex of the mesh.
     #[error("source {number} is vertex {vertex}, but the vertices are numbered 0 to {vertex_count} (exclusive)")]
     Source {
-        /// Position in the list of sources.
+        /// Position in the list of sources, from 0.
         number: usize,
         /// The vertex it names.
         vertex: i32,
         /// Number of vertices.
         vertex_count: usize,
     },
-    /// The result does not fit in memory.
+    /// There are more distances than fit in memory.
     #[error(
         "{sources} sources times {vertices} vertices are more distances than fit in memory ({}); ask for fewer sources at a time",
         memory::text((*sources as u64).saturating_mul(*vertices as u64).saturating_mul(4))
@@ -54,18 +54,19 @@ impl DistancesError {
     }
 }
 
-/// Distances along a surface from each of k `sources` to each of its n vertices, row by row (k×n), in the
-/// unit of the input.
+/// Geodesic distances along a surface from each of k `sources`, which are vertices, to each of the n vertices of the mesh:
+/// k×n values, row by row, in the unit of the input.
 ///
-/// Infinite where the surface does not lead: to other components, to vertices without faces. A source is
-/// at 0 from itself. Vertices at one position count as one. Where the surface touches itself in a single
-/// vertex, paths begin and end on all sides of it, but none passes through. The accuracy is that of the
-/// [`Metric`], rounded to single precision. The same for any number of threads.
+/// A distance is infinite where no path leads along the surface: to other components, and to vertices without faces. The
+/// distance of a source from itself is 0. Vertices at one position count as one. Where the surface touches itself in a
+/// single vertex, paths may begin and end on any side of the vertex, but none passes through it. The accuracy is that of
+/// the [`Metric`], rounded to single precision. The result is the same for any number of threads.
 ///
-/// O(n log n) a source: some 0.4 µs a vertex and source by fast marching.
+/// O(n log n) for each source; by fast marching, some 0.4 µs for each pair of a source and a vertex.
 ///
 /// # Errors
-/// [`DistancesError`]: invalid arrays, a source that is no vertex, too large, cancelled.
+/// [`DistancesError`]: the arrays are invalid, a source is not a vertex, the result is too large, or the call was
+/// cancelled.
 pub fn surface_distances(
     input: &MeshInput<'_>,
     sources: &[i32],

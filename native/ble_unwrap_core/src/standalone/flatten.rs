@@ -1,4 +1,4 @@
-//! One patch to one flat map, step by step: distances, embedding, flips removed, stretch minimised.
+//! One patch flattened as a single chart, step by step: distances, embedding, flips removed, stretch minimised.
 
 use nalgebra::Point2;
 use rayon::prelude::*;
@@ -19,7 +19,7 @@ use crate::stretch::{self, BOUNDARY_REACH, StretchError};
 /// Height, where the surface has area 1, up to which a face's lengths are rounding; such a face does not count.
 const NEGLIGIBLE: f64 = 1e-8;
 
-/// Why a patch cannot be flattened by itself. Numbers count from 0, as the arrays do.
+/// Why a patch cannot be flattened as a single chart. Numbers of elements count from 0, as the arrays do.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum FlattenError {
@@ -29,19 +29,19 @@ pub enum FlattenError {
     /// A setting is out of its range.
     #[error(transparent)]
     Setting(#[from] UnwrapError),
-    /// There is nothing to flatten.
+    /// The mesh has no faces.
     #[error("the mesh has no faces")]
     NoFaces,
-    /// All faces are lines or points.
+    /// All faces are degenerate: lines or points.
     #[error("the surface has no area to speak of: no map of it to the plane means anything; remove it")]
     NoArea,
-    /// A vertex has no position.
+    /// A vertex of a face has a coordinate that is not finite.
     #[error("face {face} has a vertex with non-finite coordinates; correct the coordinates or remove the face")]
     NotFinite {
         /// The first such face.
         face: usize,
     },
-    /// Several surfaces that no edge joins.
+    /// The surface consists of several pieces that no edge joins.
     #[error(
         "the surface comes in {pieces} pieces, one with face {first} and another with face {second}; flatten them one at a time, or use unwrap"
     )]
@@ -53,16 +53,16 @@ pub enum FlattenError {
         /// A face of another.
         second: usize,
     },
-    /// A surface that encloses something.
+    /// The surface has no boundary.
     #[error("the surface is closed; remove faces to give it a boundary, or use unwrap, which cuts it into charts")]
     Closed,
-    /// A surface that no plane map can be had of without a cut.
+    /// The surface has handles, so that it cannot be mapped to the plane without a cut.
     #[error("the surface has {genus} handles; cut them open, or use unwrap, which cuts it into charts")]
     Handles {
         /// Number of handles.
         genus: usize,
     },
-    /// One vertex would need several places in the plane.
+    /// A vertex would need several places in the plane.
     #[error(
         "vertex {vertex} holds together parts of the surface that share no edge there, or lies where more than two faces meet at an edge or the surface is one-sided; split it, or use unwrap, which cuts there"
     )]
@@ -73,26 +73,26 @@ pub enum FlattenError {
     /// Two edges join the same vertices.
     #[error("two edges join vertices {a} and {b}: no map with straight edges can part them; cut there, or use unwrap")]
     DoubledEdge {
-        /// One end of both.
+        /// The vertex at one end of both edges.
         a: usize,
-        /// The other.
+        /// The vertex at the other end.
         b: usize,
     },
-    /// Too many pairs.
+    /// There would be more landmarks than can be handled, since the distances between all pairs of them are needed.
     #[error(
         "{landmarks} landmarks are more than the {MOST_TOGETHER} whose distances can be handled; lower landmark_fraction or landmark_max"
     )]
     TooManyLandmarks {
-        /// As many as the settings ask for.
+        /// The number of landmarks that the settings ask for.
         landmarks: usize,
     },
-    /// The distances have no embedding.
+    /// The embedding failed.
     #[error(transparent)]
     Embedding(EmbeddingError),
-    /// Every way to a map without flips was defeated by rounding.
+    /// No map without flips was found, because rounding made every method fail.
     #[error("no map without flipped triangles was found")]
     NotInjective,
-    /// A numerical method failed where it should not: a defect of this library. The text says what it met.
+    /// A numerical method failed where it never should, which is a defect of this library. The text says what happened.
     #[error("{0}")]
     Internal(String),
     /// The caller asked to stop.
@@ -149,18 +149,19 @@ impl From<EmbeddingError> for FlattenError {
     }
 }
 
-/// How good a map is.
+/// How good a map from the surface to the plane is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct MapQuality {
-    /// Triangles that are turned over or have no area; exact.
+    /// Number of triangles that are turned over or have no area. This number is exact.
     pub flips: usize,
-    /// L2 stretch at the map's best scale, each flipped triangle counted as its mirror image; infinite where one has no
-    /// area.
+    /// L2 stretch at the map's best scale, with each flipped triangle counted as its mirror image; infinite where a
+    /// triangle of the map has no area.
     pub l2: f64,
-    /// L-infinity stretch, the worst of any triangle in any direction, at the scale of equal area; likewise.
+    /// L-infinity stretch: the largest stretch of any triangle in any direction, where map and surface have the same area.
+    /// Flipped triangles, and those without area, count as in `l2`.
     pub l_infinity: f64,
-    /// Pearson's correlation of the distances on the surface with those in the plane, over all pairs of a
+    /// Pearson's correlation between geodesic distances on the surface and distances in the plane, over all pairs of a
     /// landmark and another vertex. NaN where all distances are equal.
     pub distance_correlation: f64,
 }
@@ -173,31 +174,32 @@ pub struct FlattenReport {
     pub model: Model,
     /// Number of vertices of the surface.
     pub vertices: usize,
-    /// Number of triangles.
+    /// Number of triangles of the surface.
     pub triangles: usize,
-    /// Number of landmarks; all vertices if they were embedded together.
+    /// Number of landmarks; this is the number of vertices if all were embedded together.
     pub landmarks: usize,
     /// The kernel width σ, in units of squared distance.
     pub sigma: f64,
-    /// Sweeps of the fit; 0 for Isomap.
+    /// Number of sweeps of the fit; 0 for Isomap.
     pub sweeps: usize,
     /// Whether the fit reached its tolerance.
     pub converged: bool,
-    /// Log-likelihood (4) at the end; `None` for Isomap.
+    /// Log-likelihood (equation 4 of the paper) at the end; `None` for Isomap.
     pub log_likelihood: Option<f64>,
-    /// That at the start and after each sweep.
+    /// The log-likelihood at the start and after each sweep.
     pub trace: Vec<f64>,
-    /// The map straight after the embedding.
+    /// The quality of the map as the embedding gave it.
     pub before: MapQuality,
-    /// The map returned.
+    /// The quality of the map that is returned.
     pub after: MapQuality,
-    /// What took the flips away: `embedding` if there were none, else `foldover_free`, `tutte_shape` or `tutte_circle`.
+    /// The method that removed the flips: `embedding` if the embedding had none, else `foldover_free`, `tutte_shape` or
+    /// `tutte_circle`.
     pub rung: &'static str,
-    /// Iterations of the stretch minimisation; 0 if it was not asked for.
+    /// Number of iterations of the stretch minimisation; 0 if it was not asked for.
     pub stretch_iterations: usize,
-    /// Whether the boundary of the result is simple: then the map, which has no flips, does not overlap itself.
+    /// Whether the boundary of the result is simple. If it is, the map does not overlap itself, since it has no flips.
     pub boundary_is_simple: bool,
-    /// Seconds of each step, in order.
+    /// Name and duration in seconds of each step, in order.
     pub seconds: Vec<(&'static str, f64)>,
 }
 
@@ -205,26 +207,29 @@ pub struct FlattenReport {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Flattening {
-    /// A position for each vertex of the input as the embedding gave it, in the standard pose and in the unit of the
-    /// input; may have flips. NaN for vertices without faces.
+    /// A position for each vertex of the input as the embedding gave it, in the unit of the input and in a standard pose.
+    /// Triangles may be flipped. NaN for vertices without faces.
     pub embedded: Vec<[f64; 2]>,
-    /// The same without flips and with the least stretch.
+    /// A position for each vertex after flips were removed and, if asked for, stretch was minimised.
     pub uv: Vec<[f64; 2]>,
-    /// What was done and how good it is.
+    /// What was done, and how good the result is.
     pub report: FlattenReport,
 }
 
 /// Flattens one connected patch of genus 0 with a boundary (holes allowed) as a single chart, whatever its stretch, and
-/// shows the steps of the paper (section 5, figure 2): geodesic distances, embedding, flips removed, stretch minimised.
+/// shows the steps of the paper (section 5, figure 2): geodesic distances, embedding, removal of flips, minimisation of
+/// stretch.
 ///
-/// The embedding uses the landmarks that `settings.geodesics` asks for; all vertices together where its fraction is 1
-/// (whatever the bounds) or the patch has at most `settings.together_max` vertices. `minimise` off stops when
-/// the flips are gone. Guaranteed: no triangle of `uv` is flipped. Unless the report says otherwise its boundary
-/// is simple, too, if it was minimised: where it ran over itself, minimisation is done again from a circle, as in
-/// [`unwrap`](crate::unwrap()). The same for any number of threads. Not guaranteed: a bound on the stretch.
+/// The embedding uses the landmarks that `settings.geodesics` asks for. It uses all vertices together where
+/// `landmark_fraction` is 1 (whatever `landmark_min` and `landmark_max` are), or where the patch has at most
+/// `settings.together_max` vertices. If `minimise` is false, the function stops once there are no flips.
 ///
-/// As costly as the steps: O(k n log n) for the distances from k landmarks, O(k³ + sweeps·k² + kn) for the embedding, and a
-/// few dozen sparse linear systems of 2n unknowns for the stretch.
+/// Guaranteed: no triangle of `uv` is flipped. If stretch was minimised, the boundary is simple, too, unless the report
+/// says otherwise: where the boundary came to overlap itself, the minimisation is repeated from a map to a circle, as in
+/// [`unwrap`](crate::unwrap()). The result is the same for any number of threads. Not guaranteed: a bound on the stretch.
+///
+/// The cost is that of the steps, for n vertices: O(k n log n) for the distances from k landmarks, O(k³ + sweeps·k² + kn)
+/// for the embedding, and a few dozen sparse linear systems of 2n unknowns for the stretch.
 ///
 /// # Errors
 /// [`FlattenError`] says what is wrong with the patch and what to do.

@@ -1,4 +1,4 @@
-//! Any UV map of a polygon mesh: measured, and checked exactly.
+//! Measuring, and exactly checking, any UV map of a polygon mesh.
 
 use thiserror::Error;
 
@@ -9,14 +9,14 @@ use crate::progress::{Cancelled, Progress, Stage};
 use crate::settings::Settings;
 use crate::verify::{Certificate, verify};
 
-/// Why a layout cannot be measured.
+/// Why a layout cannot be measured or checked.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum LayoutError {
     /// The input arrays do not make a mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// Not one UV a corner.
+    /// The number of UVs is not the number of corners.
     #[error("there are {found} UVs, but {corners} corners; give one UV a corner")]
     UvCount {
         /// Number of UVs.
@@ -24,10 +24,10 @@ pub enum LayoutError {
         /// Number of corners.
         corners: usize,
     },
-    /// Not one chart a face.
+    /// The number of chart numbers is not the number of faces.
     #[error("there are {found} chart numbers, but {faces} faces; give one a face, or none")]
     ChartCount {
-        /// Number of charts given.
+        /// Number of chart numbers that were given.
         found: usize,
         /// Number of faces.
         faces: usize,
@@ -62,37 +62,41 @@ impl From<TooManyTriangles> for LayoutError {
     }
 }
 
-/// The figures of a UV map of polygons.
+/// The measures of a UV map of polygons.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LayoutMeasures {
     /// Number of faces.
     pub faces: usize,
-    /// Faces that have a negative chart, a corner whose UV is not finite, or a vertex that is not.
+    /// Number of faces that have no UVs: those with a negative chart, with a UV that is not finite, or with a vertex that
+    /// is not finite.
     pub unmapped_faces: usize,
-    /// Quads that are convex on the surface and bent in UV: by one of its two diagonals such a quad is drawn with a triangle
-    /// turned over.
+    /// Number of quads that are convex on the surface but not in UV. A renderer that divides such a quad by one of its two
+    /// diagonals draws a triangle that is turned over.
     pub bent_quads: usize,
-    /// The figures of the triangulated faces, those with a non-finite vertex left out.
+    /// The measures of the triangulated faces. Faces with a vertex that is not finite are left out.
     pub measures: Measures,
 }
 
-/// Measures a UV map, whoever made it: one UV a corner in `uv`, and in `chart`, if given, a number a face
-/// that is negative for faces without UVs.
+/// Measures a UV map, whoever made it. `uv` holds one UV for each corner. `chart`, if given, holds one number for each
+/// face, which is negative for faces without UVs.
 ///
-/// Faces are triangulated as [`unwrap`](crate::unwrap()) does it (with `input.corner_triangles` where they cover
-/// a face). Charts are found from the UVs; `chart` only tells which faces have any. Of the settings, those of welding and of
-/// the texture count. Without `settings.weld` a mesh that is split along its seams has no seams left.
+/// Faces are triangulated as [`unwrap`](crate::unwrap()) does it: by `input.corner_triangles` where they cover a face.
+/// Charts are found from the UVs; `chart` only tells which faces have UVs. Of the settings, only those of welding and of
+/// the texture matter. If a mesh repeats its vertices along its seams, then without `settings.weld` the seams count as
+/// boundary of the mesh, and their length is not measured.
 ///
-/// UVs are taken in the proportions of the texture, so a layout for a 2:1 texture that shows no distortion on the surface has
-/// none here either. A UV unit is `width`×`height` texels even where the layout leaves the unit square.
+/// UVs are measured in the proportions of the texture, so a layout for a 2:1 texture that shows no distortion on the
+/// surface has none here either. One unit of UV is the width and height of the texture in texels, even where the layout
+/// leaves the unit square.
 ///
-/// Guaranteed: any UVs will do, finite or not, and the result does not depend on the number of threads. Not guaranteed:
-/// exactness. Overlaps of less than 1e-9 of the layout go unseen; [`certify`] is exact. O(n log n); about two seconds for a
-/// million triangles on two cores.
+/// Guaranteed: any UVs are accepted, finite or not, and the result does not depend on the number of threads. Not
+/// guaranteed: exactness. Overlaps of less than 1e-9 of the area of the layout's bounding box are not seen; [`certify`] is
+/// exact. O(n log n); about two seconds for a million triangles on two cores.
 ///
 /// # Errors
-/// [`LayoutError`]: invalid arrays, wrong lengths, cancelled.
+/// [`LayoutError`]: the arrays are invalid or have the wrong lengths, there are too many triangles, or the call was
+/// cancelled.
 pub fn measure_layout(
     input: &MeshInput<'_>,
     uv: &[[f32; 2]],
@@ -117,19 +121,21 @@ pub fn measure_layout(
     Ok(LayoutMeasures { faces, unmapped_faces, bent_quads, measures })
 }
 
-/// Checks a UV map exactly, whoever made it: what [`unwrap`](crate::unwrap()) checks before it returns an atlas. `uv` has one
-/// UV a corner, `chart` a number a face, which is negative for faces without UVs.
+/// Checks a UV map exactly, whoever made it, by the same checks that [`unwrap`](crate::unwrap()) makes before it returns an
+/// atlas. `uv` holds one UV for each corner, and `chart` one number for each face, which is negative for faces without UVs.
 ///
-/// The certificate is [valid](Certificate::is_valid) if no triangle is turned over, no chart overlaps itself or another, all
-/// lies in the unit square and charts are the margin apart. Charts are the numbers in `chart`. Faces are triangulated and
-/// turned to face one way as [`unwrap`](crate::unwrap()) does it; the certificate counts their triangles, which follow each
-/// other in the order of the faces. Of the settings, those of welding and of the texture count.
+/// The certificate is [valid](Certificate::is_valid) if no triangle is turned over, no chart overlaps itself or another,
+/// all UVs lie in the unit square, and charts are at least the margin apart. Faces with the same number in `chart` are one
+/// chart. Faces are triangulated and consistently oriented as [`unwrap`](crate::unwrap()) does it. The certificate numbers
+/// the triangles made in this way, which are in the order of the faces. Of the settings, only those of welding and of the
+/// texture matter.
 ///
-/// All signs come from exact predicates; there is no tolerance. The same for any number of threads. O(n log n); less than a
-/// second for a million triangles.
+/// All signs come from exact predicates, so there is no tolerance. The result is the same for any number of threads. O(n
+/// log n); less than a second for a million triangles.
 ///
 /// # Errors
-/// [`LayoutError`]: invalid arrays, wrong lengths, cancelled. A map that breaks a rule is none: its certificate says so.
+/// [`LayoutError`]: the arrays are invalid or have the wrong lengths, there are too many triangles, or the call was
+/// cancelled. A map that breaks a rule is not an error: its certificate names what it breaks.
 pub fn certify(
     input: &MeshInput<'_>,
     uv: &[[f32; 2]],

@@ -1,6 +1,6 @@
-//! Single steps of the pipeline on plain arrays, for hosts that want no more than that.
+//! Single steps of the pipeline on plain arrays, for hosts that need only those.
 //!
-//! Everything is numbered as in the input, whatever conditioning does to it on the way.
+//! Vertices, corners, faces and points are numbered as in the input, whatever is done to the mesh in between.
 
 mod distances;
 mod flatten;

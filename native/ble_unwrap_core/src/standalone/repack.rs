@@ -7,19 +7,19 @@ use crate::error_kind::ErrorKind;
 use crate::packing::{self, PackError, PackItem, PackSettings, Packed};
 use crate::progress::{Cancelled, Progress, Stage};
 
-/// Why charts cannot be packed.
+/// Why charts could not be packed.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum RepackError {
-    /// Not one chart a triangle.
+    /// The number of chart numbers is not the number of triangles.
     #[error("there are {found} chart numbers, but {triangles} triangles; give one a triangle")]
     ChartCount {
-        /// Number of charts given.
+        /// Number of chart numbers that were given.
         found: usize,
         /// Number of triangles.
         triangles: usize,
     },
-    /// A triangle names a point that is not there.
+    /// A triangle names a point that does not exist.
     #[error("triangle {triangle} names point {point}, but the points are numbered 0 to {points} (exclusive)")]
     PointOutOfRange {
         /// The triangle.
@@ -29,7 +29,7 @@ pub enum RepackError {
         /// Number of points.
         points: usize,
     },
-    /// A point that would have to go two ways.
+    /// A point belongs to two charts, which move differently.
     #[error("point {point} belongs to charts {first} and {second}; give each chart points of its own")]
     SharedPoint {
         /// The point.
@@ -39,7 +39,8 @@ pub enum RepackError {
         /// Another chart.
         second: i32,
     },
-    /// The packer's own reason; its charts count from the lowest chart number.
+    /// The charts do not fit, or cannot be packed for another reason. In this error, charts are counted from 0 in ascending
+    /// order of their numbers.
     #[error(transparent)]
     Pack(#[from] PackError),
     /// The caller asked to stop.
@@ -63,34 +64,36 @@ impl RepackError {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Repacked {
-    /// A place in [0, 1]² for each point; (0, 0) for points of no chart.
+    /// The new position of each point, in [0, 1]²; (0, 0) for points that belong to no chart.
     pub uv: Vec<[f32; 2]>,
     /// Number of charts.
     pub charts: usize,
-    /// Area covered by charts over the area of the texture. A chart that overlaps itself counts its
-    /// triangles' areas, but no more than the texels it touches.
+    /// Area that charts cover, divided by the area of the texture. A chart that overlaps itself counts with the sum of its
+    /// triangles' areas, but with no more than the texels it touches.
     pub efficiency: f64,
-    /// The density all charts but specks share, in texels to a unit of the points.
+    /// The texel density that all charts share, except for tiny ones: texels to a unit of length of the points.
     pub texels_per_unit: f64,
-    /// Charts scaled up to about a texel, individually.
+    /// Number of tiny charts, each of which was scaled up to about a texel by a factor of its own.
     pub specks: usize,
 }
 
-/// Moves, turns and scales charts, all by the same factor, so that they fill the unit square and keep
-/// their margin.
+/// Moves, turns and scales charts so that they fill the unit square and keep their margin. All charts are scaled by the
+/// same factor, except for those of less than a texel.
 ///
-/// `triangles` name three of the `points` each; those of one number in `chart` make a chart, connected or
-/// not. Triangles of a negative chart are left out, as are points of no triangle.
+/// Each of the `triangles` names three of the `points`. Triangles with the same number in `chart` make up a chart,
+/// connected or not. Triangles with a negative number are left out, and so are points that belong to no triangle.
 ///
-/// Guaranteed, also after rounding to single precision: two different charts are at least the margin apart, every chart lies
-/// within the texture at least half a margin from its border, none is mirrored, and each is at least about a texel large in
-/// its larger extent (unless all its points coincide). The same for any number of threads. Not guaranteed: the greatest
-/// possible density. O(t log t) for t triangles and a bounded number of attempts; on two cores 0.05 to 0.1 s for 2 to 40
-/// charts, 0.2 to 0.3 s for 170.
+/// Guaranteed, also after rounding to single precision: two different charts are at least the margin apart; every chart
+/// lies within the texture, at least half a margin from its border; no chart is mirrored; each is at least about a texel
+/// large in its longer direction (unless all its points coincide). The result is the same for any number of threads. Not
+/// guaranteed: the greatest possible density.
+///
+/// O(t log t) for t triangles and a bounded number of attempts; on two cores 0.05 to 0.1 s for 2 to 40 charts, and 0.2 to
+/// 0.3 s for 170.
 ///
 /// # Errors
-/// [`RepackError`]: wrong lengths or indices, a point in two charts, charts that do not fit with their
-/// margin, cancelled.
+/// [`RepackError`]: lengths or indices are wrong, a point belongs to two charts, the charts do not fit with their margin,
+/// or the call was cancelled.
 pub fn repack(
     points: &[[f64; 2]],
     triangles: &[[i32; 3]],

@@ -61,13 +61,13 @@ use crate::linalg::SparseError;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::progress::{Cancelled, Progress};
 
-/// How stretch is minimised.
+/// The method by which stretch is minimised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Solver {
-    /// Projected Newton on all vertices at once.
+    /// Projected Newton steps, which move all vertices at once.
     Newton,
-    /// One vertex at a time along random lines, as in the paper.
+    /// One vertex at a time is moved along random lines, as in the paper.
     LineSearch,
 }
 
@@ -76,19 +76,19 @@ choices!(Solver {
     LineSearch: "line_search", "Line Search", "One vertex at a time along random directions, as in the paper.";
 });
 
-/// How stretch is minimised.
+/// How stretch is minimised, and when to stop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StretchSettings {
     /// The method.
     pub solver: Solver,
-    /// Newton steps, or sweeps over all vertices, at most.
+    /// Greatest number of Newton steps or, for line searches, of sweeps over all vertices.
     pub max_iterations: usize,
-    /// Stop when an iteration gains less than this share of the energy.
+    /// The minimisation stops when an iteration lowers the energy by less than this share of it.
     pub tolerance: f64,
-    /// Weight of the symmetric Dirichlet energy beside the L2 stretch, 0 to 1. For Newton only. More keeps
-    /// the worst triangle better, less lowers the L2 stretch: on half a cat, half a fan disk and a
-    /// camel's head 0.15 gives 1.114, 1.095, 1.322, 0.05 gives 1.107, 1.092, 1.301, 0 gives 1.099, 1.079, 1.211
-    /// in up to four times the steps.
+    /// Weight of the symmetric Dirichlet energy that is added to the L2 stretch, from 0 to 1; used only by Newton's method.
+    /// A higher weight treats the worst triangles better, a lower one gives less L2 stretch. For instance, the L2 stretch
+    /// of half a cat, half a fan disk and a camel's head is 1.114, 1.095 and 1.322 with weight 0.15; 1.107, 1.092 and 1.301
+    /// with 0.05; and 1.099, 1.079 and 1.211 with 0, which takes up to four times as many steps.
     pub dirichlet_weight: f64,
 }
 
@@ -99,7 +99,7 @@ impl Default for StretchSettings {
 }
 
 impl StretchSettings {
-    /// The paper's: line searches on the plain L2 stretch.
+    /// The paper's method: line searches on the L2 stretch alone.
     #[must_use]
     pub fn paper() -> Self {
         Self { solver: Solver::LineSearch, max_iterations: 60, tolerance: 1e-4, dirichlet_weight: 0.0 }

@@ -38,12 +38,13 @@ use crate::progress::{Cancelled, Progress};
 
 use boundary::{Boundary, Vertices};
 
-/// How many elements break a rule, and the first of them.
+/// How many elements of a layout break a rule, and the first of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Defect<T> {
-    /// Number of offenders.
+    /// Number of elements that break the rule.
     pub count: usize,
-    /// The lowest offender (see [`Certificate::complete`]).
+    /// The element that breaks the rule and has the lowest number. If the checks are not [complete](Certificate::complete),
+    /// it may be another.
     pub first: Option<T>,
 }
 
@@ -67,42 +68,43 @@ impl<T: Copy + Ord> Defect<T> {
     }
 }
 
-/// The outcome of the exact checks.
+/// The outcome of the exact checks of a layout. Triangles are those of the triangulated faces; the label of a triangle is
+/// the number of its chart.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Certificate {
-    /// Charts: different non-negative labels.
+    /// Number of charts: of different labels that are not negative.
     pub charts: usize,
-    /// Triangles with a negative label. They are part of no other check and no fault by themselves.
+    /// Triangles with a negative label. They take part in no other check, and break no rule by themselves.
     pub unmapped: Defect<u32>,
-    /// Triangles with a corner outside the unit square, or not finite.
+    /// Triangles with a corner that is outside the unit square or not finite.
     pub out_of_range: Defect<u32>,
-    /// Triangles not strictly positive: turned over or without area.
+    /// Triangles that are not strictly positive: they are turned over or have no area.
     pub flipped: Defect<u32>,
-    /// Pairs of boundary edges of one chart that cross or touch, other than by following each other;
-    /// named by their triangles, lower first. Also a vertex that a boundary visits twice.
+    /// Pairs of boundary edges of one chart that cross or touch, except where one follows the other. Each is named by the
+    /// triangles of the two edges, the lower number first. A vertex that a boundary visits twice counts, too.
     pub crossings_inside: Defect<(u32, u32)>,
-    /// Pairs of boundary edges of different charts that have a point in common.
+    /// Pairs of boundary edges of different charts that have a point in common, named in the same way.
     pub crossings_between: Defect<(u32, u32)>,
-    /// Boundary loops inside the filled area of another chart: a triangle at the loop, and the lowest
-    /// triangle of that chart. Not looked for where contacts were too many to count.
+    /// Boundary loops inside the filled area of another chart. Each is named by a triangle at the loop and the triangle of
+    /// that chart with the lowest number. They are not looked for where contacts were too many to count.
     pub nested: Defect<(u32, u32)>,
-    /// Charts (labels) that do not have exactly one positively oriented boundary loop: in pieces, or
+    /// Labels of the charts that do not have exactly one positively oriented boundary loop, because they are in pieces or
     /// turned inside out.
     pub bad_loops: Defect<i32>,
-    /// Labels of all charts that break a rule, ascending.
+    /// Labels of all charts that break a rule, in ascending order.
     pub faulty_charts: Vec<i32>,
-    /// Least distance between boundaries of different charts in texels, not exact but to rounding;
-    /// the search limit (eight texels, or twice the margin) if it is more.
+    /// Least distance between the boundaries of different charts in texels. Unlike the checks, it is subject to rounding. A
+    /// distance above eight texels and above twice the margin is given as the larger of these two values.
     pub gap_texels: f64,
-    /// What that distance has to be.
+    /// The margin: the value that `gap_texels` has to reach.
     pub margin_texels: f64,
-    /// False if a bound of work ended a search. Then there are so many contacts that counts are lower
-    /// bounds and the first offender need not be the lowest, or nothing is proven.
+    /// Whether all searches came to their end. A search gives up when there are too many contacts. The counts are then
+    /// lower bounds, and the first element need not be the one with the lowest number; or nothing is proven.
     pub complete: bool,
 }
 
-/// What is wrong, in one clause; "nothing" where nothing is.
+/// Says in one clause what is wrong, or "nothing".
 impl fmt::Display for Certificate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let counts = [

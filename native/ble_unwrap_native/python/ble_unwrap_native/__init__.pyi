@@ -4,7 +4,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any, Literal, TypedDict, Unpack, final, type_check_only
 
-from typing_extensions import Buffer  # of collections.abc from Python 3.12 on
+from typing_extensions import Buffer  # in collections.abc from Python 3.12 on
 
 __all__ = [
     "Analysis",
@@ -301,7 +301,8 @@ class Job:
     def is_cancelled(self) -> bool: ...
     def is_finished(self) -> bool: ...
     def wait(self, timeout: float | None = None) -> bool: ...
-    # An `Atlas` after `submit_unwrap`, a `PointAtlas` after `submit_unwrap_points`, else what the call that was given the job returned.
+    # Returns an `Atlas` after `submit_unwrap`, and a `PointAtlas` after `submit_unwrap_points`.
+    # After any other call that was given this job, it returns what that call returned.
     def result(self) -> Any: ...
 
 def unwrap(
