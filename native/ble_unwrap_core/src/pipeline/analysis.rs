@@ -212,35 +212,28 @@ impl Prepared {
 mod tests {
     use super::*;
 
-    /// Two unit squares, far apart, as four triangles, the corners of each triangle its own vertices.
-    fn squares() -> (Vec<[f64; 3]>, Vec<i32>, Vec<i32>) {
+    /// Does something with two unit squares, far apart, as four triangles, the corners of each triangle its own vertices.
+    fn with_squares<T>(act: impl FnOnce(&MeshInput<'_>) -> T) -> T {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-        let positions = [0.0, 5.0].iter().flat_map(|x| corners.map(|c| [c[0] + x, c[1], 0.0])).collect();
-        (positions, (0..12).collect(), (0..=12).step_by(3).collect())
-    }
-
-    fn analysed(settings: &Settings) -> Analysis {
-        let (positions, corner_vertices, face_offsets) = squares();
-        let input = MeshInput {
+        let positions: Vec<[f64; 3]> = [0.0, 5.0].iter().flat_map(|x| corners.map(|c| [c[0] + x, c[1], 0.0])).collect();
+        let corner_vertices: Vec<i32> = (0..12).collect();
+        let face_offsets: Vec<i32> = (0..=12).step_by(3).collect();
+        act(&MeshInput {
             positions: &positions,
             corner_vertices: &corner_vertices,
             face_offsets: &face_offsets,
             ..MeshInput::default()
-        };
-        Analysis::new(&input, settings, &Progress::new()).expect("a mesh")
+        })
+    }
+
+    fn analysed(settings: &Settings) -> Analysis {
+        with_squares(|input| Analysis::new(input, settings, &Progress::new())).expect("a mesh")
     }
 
     #[test]
     fn it_unwraps_as_a_single_call_does_whatever_went_before() {
-        let (positions, corner_vertices, face_offsets) = squares();
-        let input = MeshInput {
-            positions: &positions,
-            corner_vertices: &corner_vertices,
-            face_offsets: &face_offsets,
-            ..MeshInput::default()
-        };
         let settings = Settings { weld: true, ..Settings::default() };
-        let once = crate::unwrap(&input, &settings, &Progress::new()).expect("unwraps");
+        let once = with_squares(|input| crate::unwrap(input, &settings, &Progress::new())).expect("unwraps");
         let analysis = analysed(&settings);
         assert_eq!((analysis.face_count(), analysis.prepared.components.len()), (4, 2));
         for other in [settings.clone(), Settings { stretch_limit: 2.0, ..settings.clone() }, settings.clone()] {
@@ -260,15 +253,8 @@ mod tests {
         assert_eq!(refused(Settings::default()), "weld");
         assert_eq!(refused(Settings { weld: true, ..Settings::default() }), "weld_distance");
         assert_eq!(refused(Settings { weld: true, weld_distance: Some(-1.0), ..Settings::default() }), "weld_distance");
-        let (positions, corner_vertices, face_offsets) = squares();
-        let input = MeshInput {
-            positions: &positions,
-            corner_vertices: &corner_vertices,
-            face_offsets: &face_offsets,
-            ..MeshInput::default()
-        };
         let negative = Settings { weld: true, weld_distance: Some(f64::NAN), ..Settings::default() };
-        let error = Analysis::new(&input, &negative, &Progress::new()).map(|_| ());
+        let error = with_squares(|input| Analysis::new(input, &negative, &Progress::new())).map(|_| ());
         assert!(matches!(error, Err(UnwrapError::Setting { name: "weld_distance", .. })));
     }
 

@@ -152,13 +152,7 @@ fn relax_worst(
     for pinned in pins {
         let none = OtherHalves::default();
         let mut descent = Descent::new(&near.mesh, &near.rest, &none, near.read(uv), pinned.clone(), None)?;
-        for _ in 0..WORST_STEPS {
-            progress.check()?;
-            let Some((before, after)) = descent.step(&near.mesh, energy) else { break };
-            if before - after <= WORST_TOLERANCE * after {
-                break;
-            }
-        }
+        descent.take_steps(&near.mesh, energy, WORST_STEPS, WORST_TOLERANCE, progress)?;
         let mut relaxed = uv.to_vec();
         near.write(&descent.uv, &mut relaxed);
         if first_flip(mesh, &relaxed).is_none() && (!keep_apart || boundary_is_simple(mesh, &relaxed)) {
@@ -182,13 +176,7 @@ pub(super) fn relax_with_halves(
 ) -> Result<Vec<Point2<f64>>, StretchError> {
     let energy = StretchEnergy::new(settings.dirichlet_weight);
     let mut descent = Descent::new(mesh, rest, halves, start, pinned.to_vec(), None)?;
-    for _ in 0..settings.max_iterations {
-        progress.check()?;
-        let Some((before, after)) = descent.step(mesh, &energy) else { break };
-        if before - after <= settings.tolerance * after {
-            break;
-        }
-    }
+    descent.take_steps(mesh, &energy, settings.max_iterations, settings.tolerance, progress)?;
     Ok(descent.uv)
 }
 
@@ -205,13 +193,7 @@ pub(super) fn relax_peak(
 ) -> Result<Vec<Point2<f64>>, StretchError> {
     let energy = PeakEnergy::new(StretchSettings::default().dirichlet_weight, peak);
     let mut descent = Descent::new(mesh, rest, halves, start, pinned.to_vec(), None)?;
-    for _ in 0..WORST_STEPS {
-        progress.check()?;
-        let Some((before, after)) = descent.step(mesh, &energy) else { break };
-        if before - after <= WORST_TOLERANCE * after {
-            break;
-        }
-    }
+    descent.take_steps(mesh, &energy, WORST_STEPS, WORST_TOLERANCE, progress)?;
     Ok(descent.uv)
 }
 
@@ -247,6 +229,25 @@ impl<'a> Descent<'a> {
             Some(barrier) if own.is_finite() => own + barrier.value(uv),
             _ => own,
         }
+    }
+
+    /// So many Newton steps at most, until one gains less than a share of the energy.
+    fn take_steps<E: IsotropicEnergy>(
+        &mut self,
+        mesh: &TriMesh,
+        energy: &E,
+        most: usize,
+        tolerance: f64,
+        progress: &Progress,
+    ) -> Result<(), StretchError> {
+        for _ in 0..most {
+            progress.check()?;
+            let Some((before, after)) = self.step(mesh, energy) else { break };
+            if before - after <= tolerance * after {
+                break;
+            }
+        }
+        Ok(())
     }
 
     /// One Newton step; the energy before and after, or `None` if there is no step downhill.
