@@ -88,7 +88,7 @@ class Run:
 
 
 class RunJob:
-    """The parts of a `Run` one after the other, asked like an `computation.Job`: asking is what starts the next one."""
+    """The parts of a `Run` one after the other, asked like a `computation.Job`: asking is what starts the next one."""
 
     def __init__(self, tasks):
         self._waiting = list(reversed(tasks))

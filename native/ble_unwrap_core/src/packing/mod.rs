@@ -281,7 +281,8 @@ impl PackError {
     }
 }
 
-/// What a triangle takes while its outline is found, and what a chart in many poses does, in bytes.
+/// What a triangle takes while its outline is found, and what a chart takes in its many poses, in bytes: 58 were measured for each of
+/// 800,000 triangles in one chart, and 6.8 KiB for each of 119,000 charts of one triangle.
 const OF_TRIANGLE: u64 = 256;
 const OF_ITEM: u64 = 8 << 10;
 

@@ -80,7 +80,7 @@ choices!(LimitOver {
     Atlas: "atlas", "Whole Atlas", "All charts together keep the limit, while some exceed it, up to fourfold above 1: fewer charts.";
 });
 
-/// Where the values of settings come from that are not given.
+/// The preset that gives the values of all settings that are not named.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Preset {

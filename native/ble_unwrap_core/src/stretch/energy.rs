@@ -73,8 +73,8 @@ impl IsotropicEnergy for StretchEnergy {
     }
 }
 
-/// The stretch energy, and a power of the squared stretch e beside it that is worth nothing but where e is near its peak m:
-/// h + W·m/p·(e/m)ᵖ. At the peak it pulls W times as hard on e as the plain stretch does twice, at half of it an eighth of that.
+/// The stretch energy h, and beside it a power of the squared stretch e that counts only where e is near its peak m:
+/// h + W·m/p·(e/m)ᵖ. The slope of the second term in e is W at the peak and an eighth of that at half of it; that of h is ½.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PeakEnergy {
     plain: StretchEnergy,

@@ -8,7 +8,8 @@ use nalgebra::{Point2, Vector2};
 
 /// Edges in a leaf of the tree.
 const LEAF: usize = 4;
-/// Boxes that the vertices may look at, for each of them; on boundaries that move together it is some hundred.
+/// Boxes that may be looked at, for each vertex of the boundary. A boundary that moves together stays far below; one that is
+/// thrown about would otherwise take the square of its length.
 const MOST_VISITS: usize = 1024;
 /// Share of a length that rounding may take of the places compared, far above what it does.
 const ROUNDING: f64 = 1e-14;

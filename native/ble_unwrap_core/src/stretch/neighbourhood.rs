@@ -47,6 +47,11 @@ impl Neighbourhood {
         self.faces.binary_search(&f).ok().map(FaceId::new)
     }
 
+    /// The vertices that must not move where the border of the chart, too, is to stay as it is.
+    pub(super) fn pinned_and_border(&self) -> Vec<bool> {
+        self.mesh.vertices().map(|v| self.pinned[v.index()] || self.mesh.is_boundary_vertex(v)).collect()
+    }
+
     /// The neighbourhood's part of a map.
     pub(super) fn read(&self, uv: &[Point2<f64>]) -> Vec<Point2<f64>> {
         self.vertices.iter().map(|v| uv[v.index()]).collect()

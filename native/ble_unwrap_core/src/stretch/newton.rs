@@ -145,8 +145,7 @@ fn relax_worst(
         return Ok(());
     }
     let near = Neighbourhood::new(mesh, rest, &bad, WORST_RINGS);
-    let border: Vec<bool> =
-        near.mesh.vertices().map(|v| near.pinned[v.index()] || near.mesh.is_boundary_vertex(v)).collect();
+    let border = near.pinned_and_border();
     // Where a border that moves would run over another it stays.
     let pins = if keep_apart { vec![&near.pinned, &border] } else { vec![&near.pinned] };
     for pinned in pins {

@@ -91,8 +91,7 @@ fn lowered(
     let peak = peaks().map(|f| squared_stretch(&jacobian(f))).fold(1.0, f64::max);
     let near = Neighbourhood::new(mesh, rest, &is_peak, RINGS);
     let within = halves.part(mesh, &near);
-    let border: Vec<bool> =
-        near.mesh.vertices().map(|v| near.pinned[v.index()] || near.mesh.is_boundary_vertex(v)).collect();
+    let border = near.pinned_and_border();
     // Where a border that moves would run over another it stays.
     for pinned in [&near.pinned, &border] {
         let relaxed = relax_peak(&near.mesh, &near.rest, &within, pinned, near.read(uv), peak, progress)?;

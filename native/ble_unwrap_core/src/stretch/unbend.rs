@@ -150,8 +150,7 @@ impl Mending<'_> {
         }
         let near = Neighbourhood::new(self.mesh, self.rest, &bad, rings);
         let within = self.halves.part(self.mesh, &near);
-        let border: Vec<bool> =
-            near.mesh.vertices().map(|v| near.pinned[v.index()] || near.mesh.is_boundary_vertex(v)).collect();
+        let border = near.pinned_and_border();
         let faults = self.faults(uv);
         // Where a border that moves would run over another it stays.
         for pinned in [&near.pinned, &border] {

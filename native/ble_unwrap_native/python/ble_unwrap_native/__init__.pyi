@@ -55,7 +55,7 @@ class InternalError(BleUnwrapError): ...
 @type_check_only
 class _CallSettings(TypedDict, total=False):
     preset: Literal["default", "paper", "iso_charts"]
-    """Where the values of settings come from that are not given. "default": Extended model, fast solvers: least stretch and fewest charts. "paper": The published method as printed: slower, more charts. "iso_charts": The same with Isomap, the method the paper compares itself with."""
+    """The preset that gives the values of all settings that are not named in the call. "default": Extended model, fast solvers: least stretch and fewest charts. "paper": The published method as printed: slower, more charts. "iso_charts": The same with Isomap, the method the paper compares itself with."""
     threads: int
     """Processor threads to work with; 0 takes all that the machine has. The result does not depend on it."""
 
