@@ -57,9 +57,13 @@ MAY_USE = {
     "clock": set(),
     "error": {"error_kind", "memory", "mesh", "metrics", "packing", "progress", "verify"},
     "settings": {"choice", "embedding", "error", "geodesics", "mesh", "packing", "segmentation", "stretch"},
-    "flattening": TOOLS | {"embedding", "settings", "stretch"},
+    "cache": TOOLS,
+    "flattening": TOOLS | {"cache", "charts", "embedding", "settings", "stretch"},
+    # From surfaces to charts, and from charts to atlases.
+    "cutting": TOOLS | set(STAGES) - {"packing"} | {"cache", "flattening", "settings"},
+    "layout": TOOLS | set(STAGES) | JUDGES | GATHERED | RESULTS | {"cache", "cutting", "flattening"},
     # What sees several stages. None of the three sees another.
-    "pipeline": TOOLS | set(STAGES) | JUDGES | GATHERED | RESULTS | {"flattening"},
+    "unwrap": FOUNDATION | GATHERED | RESULTS | {"cache", "cutting", "layout"},
     "cloud": TOOLS | set(STAGES) | GATHERED | {"clock", "report"},
     "standalone": TOOLS | set(STAGES) | JUDGES | GATHERED | {"clock", "flattening"},
     # The benchmarks' and tests' window into the stages.
@@ -71,16 +75,18 @@ MAY_USE = {
         "error_kind",
         "mesh",
         "packing",
-        "pipeline",
         "progress",
         "report",
         "settings",
+        "unwrap",
         "verify",
     },
 }
 # Module -> modules of which it may name types (in CamelCase) only.
 MAY_NAME_TYPES_OF = {
     **{stage: set(STAGES[:i]) for i, stage in enumerate(STAGES)},
+    # Its settings say nothing of charts, and are left out of a fingerprint of what makes them.
+    "cutting": {"packing"},
     "metrics": {"charts", "packing"},
     "verify": {"charts", "packing"},
 }
@@ -196,16 +202,20 @@ def test_core_layers():
     assert not [offence for file in files for offence in offences(file, root_names)]
 
 
-# The pipeline, stage by stage: a file uses those of the rows above its own.
-PIPELINE = [
-    {"memo", "needs", "rigid", "tally"},
-    {"flatten"},
-    {"polygon", "relief", "sew", "darts", "recut", "ribbons", "prolong", "touch_up"},
-    {"charting", "carry", "budget"},
-    {"merge"},
+# From a surface to charts: a file, or a folder as a whole, uses those of the rows above its own.
+CUTTING = [
+    {"charted", "rigid_motion", "measured"},
+    {"state", "edit"},
+    {"border", "history"},
+    {"moves/mod"},
+    {"moves/split", "moves/dart", "moves/net"},
+    {"attempt"},
+    {"trial", "divide"},
+    {"search"},
+    {"moves/join", "moves/partial_join", "moves/hand_over", "moves/across"},
+    {"whole", "atlas_limit"},
+    {"level/carry", "level/prolong", "level/mod"},
     {"component"},
-    {"finish"},
-    {"analysis"},
     {"mod"},
 ]
 
@@ -223,15 +233,16 @@ def files_used(file: Path) -> set[Path]:
     return used
 
 
-def test_the_pipeline_goes_one_way():
-    floor = {name: i for i, row in enumerate(PIPELINE) for name in row}
-    files = [f for f in library_files() if module_path(f)[0:1] == ("pipeline",)]
-    assert {f.stem for f in files} == set(floor), "every file of the pipeline is in the table, and no other"
+def test_cutting_goes_one_way():
+    folder = CORE / "cutting"
+    floor = {name: i for i, row in enumerate(CUTTING) for name in row}
+    names = {f: f.relative_to(folder).with_suffix("").as_posix() for f in library_files() if folder in f.parents}
+    assert set(names.values()) == set(floor), "every file of the folder is in the table, and no other"
     upward = [
-        f"{file.name} uses {used.name}"
-        for file in files
+        f"{name} uses {names[used]}"
+        for file, name in names.items()
         for used in files_used(file)
-        if used.parent == file.parent and floor[used.stem] >= floor[file.stem]
+        if used in names and floor[names[used]] > floor[name]
     ]
     assert not upward
 

@@ -225,7 +225,7 @@ mod sampled {
                 ),
                 ("/x/private-gemm-x86-0.1.20/src/lib.rs", "<A as B<C>>::gemm", Some("private-gemm-x86::lib::gemm")),
                 ("native/ble_unwrap_core/src/lib.rs", "f<fn(u8) -> u8>", Some("lib::f")),
-                ("native/ble_unwrap_core/src/pipeline/merge.rs", "{closure#4}<u8>", None),
+                ("native/ble_unwrap_core/src/cutting/search.rs", "{closure#4}<u8>", None),
                 ("/x/rayon-core-1.13.0/src/join/mod.rs", "join_context", None),
                 ("/rustc/1234/library/core/src/ops/function.rs", "call_mut", None),
                 ("no/such/place.rs", "f", None),

@@ -130,11 +130,13 @@
 #![warn(unnameable_types)]
 
 mod atlas;
+mod cache;
 mod charts;
 mod choice;
 mod clock;
 mod cloud;
 mod collections;
+mod cutting;
 mod distortion;
 pub mod embedding;
 mod error;
@@ -143,12 +145,12 @@ mod flattening;
 mod geodesics;
 #[doc(hidden)]
 pub mod internals;
+mod layout;
 mod linalg;
 pub mod memory;
 mod mesh;
 mod metrics;
 mod packing;
-mod pipeline;
 mod predicates;
 mod progress;
 mod random;
@@ -159,6 +161,7 @@ mod segmentation;
 pub mod settings;
 pub mod standalone;
 mod stretch;
+mod unwrap;
 mod verify;
 
 pub use atlas::Atlas;
@@ -167,8 +170,8 @@ pub use error::UnwrapError;
 pub use error_kind::ErrorKind;
 pub use mesh::{MeshError, MeshInput};
 pub use packing::PackError;
-pub use pipeline::{Analysis, unwrap};
 pub use progress::{Cancelled, Progress, Stage};
 pub use report::Report;
 pub use settings::Settings;
+pub use unwrap::{Analysis, unwrap};
 pub use verify::{Certificate, Defect};

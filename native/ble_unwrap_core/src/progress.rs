@@ -169,7 +169,7 @@ impl Progress {
         self.raise(stage.begin());
     }
 
-    /// Reports that `share` (0 to 1) of `stage` is done. For the pipeline.
+    /// Reports that `share` (0 to 1) of `stage` is done. For the stages.
     pub(crate) fn advance(&self, stage: Stage, share: f64) {
         let end = Stage::ALL[(stage as usize + 1).min(Stage::ALL.len() - 1)].begin();
         self.raise(stage.begin() + (end - stage.begin()) * share.clamp(0.0, 1.0));

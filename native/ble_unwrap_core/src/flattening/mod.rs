@@ -1,9 +1,17 @@
-//! What takes one patch into the plane, step by step, and how it was got there.
+//! What takes one patch into the plane, and how it was got there.
 //!
-//! The [pipeline](crate::unwrap()) tries these steps under a limit, [`flatten`](crate::standalone::flatten()) shows them one by one.
+//! `steps` holds the steps, each by itself: [`flatten`](crate::standalone::flatten()) shows them one by one. `ladder` tries them
+//! under a limit, each where the one before does not do, and `polygon` is its last rung, for single polygons.
 
+mod ladder;
+mod polygon;
 mod rungs;
 mod steps;
 
+pub(crate) use ladder::{
+    Flattened, NEGLIGIBLE, Polished, Positions, flatten, flatten_apart, is_sharp, isometric, l2, opened, part_of_chart,
+    polish, projected, sewn,
+};
+pub(crate) use polygon::{flatten_polygon, thicken};
 pub(crate) use rungs::{Rung, Rungs};
 pub(crate) use steps::Steps;

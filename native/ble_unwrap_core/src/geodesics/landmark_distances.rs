@@ -4,7 +4,7 @@ use crate::mesh::VertexId;
 
 /// The k×n block of geodesic distances from k landmarks to the n vertices of a mesh.
 ///
-/// Kept in single precision: half the memory of the largest array of the pipeline, and its relative
+/// Kept in single precision: half the memory of the largest array of an unwrap, and its relative
 /// error of 6e-8 lies far below the discretisation error of any geodesic.
 #[derive(Clone, Debug)]
 pub(crate) struct LandmarkDistances {

@@ -202,7 +202,7 @@ impl Settings {
         }
     }
 
-    /// The method that the paper compares itself with: iso-charts (Zhou, Snyder, Guo, Shum 2004). The pipeline and the
+    /// The method that the paper compares itself with: iso-charts (Zhou, Snyder, Guo, Shum 2004). The stages and the
     /// settings are those of [`Settings::paper`], with Isomap in place of Bernoulli logistic embedding.
     #[must_use]
     pub fn iso_charts() -> Self {

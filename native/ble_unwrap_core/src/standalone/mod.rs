@@ -1,4 +1,4 @@
-//! Single steps of the pipeline on plain arrays, for hosts that need only those.
+//! Single steps of an unwrap on plain arrays, for hosts that need only those.
 //!
 //! Vertices, corners, faces and points are numbered as in the input, whatever is done to the mesh in between.
 

@@ -2,6 +2,7 @@
 
 use nalgebra::Point2;
 
+use crate::cache::{Fingerprint, Kind, Run};
 use crate::charts::{Chart, Patch};
 use crate::distortion::{self, RestTriangle};
 use crate::embedding::{self, EmbeddingError, Model};
@@ -11,9 +12,8 @@ use crate::progress::Cancelled;
 use crate::settings::Settings;
 use crate::stretch::{self, BOUNDARY_REACH, Minimised, StretchError};
 
-use super::memo::{Fingerprint, Kind, Run};
-use crate::flattening::Steps;
-use crate::flattening::{Rung, Rungs};
+use super::rungs::{Rung, Rungs};
+use super::steps::Steps;
 
 /// A chart is refused if one hundredth of its area is stretched by more than this: it would blur
 /// visibly there although its L2, an average, is fine.
@@ -23,7 +23,7 @@ const MOST_P99_STRETCH: f64 = 4.0;
 /// half a per cent of strain 1.006. What is above has folded away area that lies in thin faces.
 const ISOMETRIC: f64 = 1.01;
 /// Height (the whole surface has area 1) up to which a face's lengths are rounding.
-pub(super) const NEGLIGIBLE: f64 = 1e-8;
+pub(crate) const NEGLIGIBLE: f64 = 1e-8;
 /// An embedding folded over more of its area than this is near no flat map. Of 598 trials on three
 /// development models 275 were above; 7 of these ended under the limit, after most of the time spent on all. The printed
 /// model folds even what is flat, so of it this tells nothing.
@@ -43,29 +43,29 @@ const MOST_FOR_TUTTE: usize = 100;
 const MOST_LEANING: f64 = 70.0;
 
 /// A position in the plane for each vertex.
-pub(super) type Positions = Vec<Point2<f64>>;
+pub(crate) type Positions = Vec<Point2<f64>>;
 
 fn bytes_of_start(start: &Option<Positions>) -> usize {
     16 * start.as_ref().map_or(0, Vec::len)
 }
 
-/// A chart over the limit by so many times at most may come under it by one cut. See `LATE_DARTS` in [`super::charting`].
+/// A chart over the limit by so many times at most may come under it by one cut. See `LATE_DARTS` in `cutting/attempt.rs`.
 const NEAR: f64 = 1.25;
 
 /// A patch flattened without flips and without overlap.
-pub(super) struct Flat {
-    pub(super) uv: Positions,
-    pub(super) l2: f64,
+pub(crate) struct Flat {
+    pub(crate) uv: Positions,
+    pub(crate) l2: f64,
 }
 
 impl Flat {
-    pub(super) fn into_chart(self, patch: Patch) -> Chart {
+    pub(crate) fn into_chart(self, patch: Patch) -> Chart {
         Chart { patch, uv: self.uv, l2: self.l2 }
     }
 }
 
 /// What came of flattening a patch under a limit.
-pub(super) enum Flattened {
+pub(crate) enum Flattened {
     Flat(Flat),
     /// A little over the limit, and where its vertices came to lie.
     Near(Positions),
@@ -74,7 +74,7 @@ pub(super) enum Flattened {
 
 /// Isometric flattening of a planar or developable patch of genus 0 with a boundary; `None` where
 /// there is none without overlap.
-pub(super) fn isometric(patch: &Patch, rungs: &mut Rungs) -> Option<Flat> {
+pub(crate) fn isometric(patch: &Patch, rungs: &mut Rungs) -> Option<Flat> {
     isometric_of(patch, &RestTriangle::of_mesh(&patch.mesh), rungs)
 }
 
@@ -96,49 +96,49 @@ fn isometric_of(patch: &Patch, rest: &[RestTriangle], rungs: &mut Rungs) -> Opti
 }
 
 /// L2 stretch of the surface as it is; of the thickened rest triangles where it has no area.
-pub(super) fn l2(patch: &Patch, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
+pub(crate) fn l2(patch: &Patch, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
     let true_l2 = stretch::l2_of_positions(&patch.mesh, uv, NEGLIGIBLE);
     if true_l2.is_nan() { stretch::l2_stretch(&patch.mesh, rest, uv) } else { true_l2 }
 }
 
 /// Flattens a patch of genus 0 with a boundary by embedding and stretch minimisation. The work stops as soon as it is clear
 /// that the limit is out of reach.
-pub(super) fn flatten(
+pub(crate) fn flatten(
     patch: &Patch,
     distances: &LandmarkDistances,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Run<'_>,
+    run: &Run<'_>,
 ) -> Result<Flattened, Cancelled> {
-    let trial = Trial::new(patch, settings, progress);
+    let trial = Trial::new(patch, settings, run);
     recover(trial.flatten(distances, Some(settings.stretch_limit), rungs), Flattened::Refused)
 }
 
 /// The same whatever the stretch.
-pub(super) fn without_limit(
+pub(crate) fn without_limit(
     patch: &Patch,
     distances: &LandmarkDistances,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Run<'_>,
+    run: &Run<'_>,
 ) -> Result<Flattened, Cancelled> {
-    recover(Trial::new(patch, settings, progress).flatten(distances, None, rungs), Flattened::Refused)
+    recover(Trial::new(patch, settings, run).flatten(distances, None, rungs), Flattened::Refused)
 }
 
 /// Flattens a patch of genus 0 with a boundary from its projection, if it leans so little from its mean plane that this
 /// has no flip and no overlap; `None` if it does not. Where the limit is out of reach another start would not help. Costs
 /// neither distances nor an embedding.
-pub(super) fn projected(
+pub(crate) fn projected(
     patch: &Patch,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Run<'_>,
+    run: &Run<'_>,
 ) -> Result<Option<Flattened>, Cancelled> {
     let Some(start) = embedding::project(&patch.mesh, MOST_LEANING) else { return Ok(None) };
     if stretch::first_flip(&patch.mesh, &start).is_some() || !stretch::boundary_is_simple(&patch.mesh, &start) {
         return Ok(None);
     }
-    match Trial::new(patch, settings, progress).free(&start, Some(settings.stretch_limit)) {
+    match Trial::new(patch, settings, run).free(&start, Some(settings.stretch_limit)) {
         Ok(Free::Simple(flat)) => {
             rungs.take(Rung::Projection);
             Ok(Some(Flattened::Flat(flat)))
@@ -151,13 +151,13 @@ pub(super) fn projected(
 
 /// Flattens a patch that has just been cut open, from where it lay before: the cut is given room. Refused where it opens
 /// the wrong way.
-pub(super) fn opened(
+pub(crate) fn opened(
     patch: &Patch,
     start: &[Point2<f64>],
     settings: &Settings,
-    progress: &Run<'_>,
+    run: &Run<'_>,
 ) -> Result<Flattened, Cancelled> {
-    let trial = Trial::new(patch, settings, progress);
+    let trial = Trial::new(patch, settings, run);
     let flattened = trial.free(start, Some(settings.stretch_limit)).map(|free| match free {
         Free::Simple(flat) => Flattened::Flat(flat),
         Free::Over(Some(uv)) => Flattened::Near(uv),
@@ -167,7 +167,7 @@ pub(super) fn opened(
 }
 
 /// What came of a start in the plane.
-pub(super) enum Polished {
+pub(crate) enum Polished {
     Flat(Flat),
     /// The limit is out of reach.
     Refused,
@@ -177,28 +177,28 @@ pub(super) enum Polished {
 
 /// Flattens a patch of genus 0 with a boundary from a start in the plane near its minimum, whose boundary is all but
 /// simple; `rung` is where the start comes from.
-pub(super) fn polish(
+pub(crate) fn polish(
     patch: &Patch,
     start: &[Point2<f64>],
     rung: Rung,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Run<'_>,
+    run: &Run<'_>,
 ) -> Result<Polished, Cancelled> {
-    let trial = Trial::new(patch, settings, progress);
+    let trial = Trial::new(patch, settings, run);
     trial.isometric_or(rungs, |rungs| trial.polish_or_not(start, settings.stretch_limit, rung, rungs))
 }
 
 /// Flattens the union of charts from where their faces are drawn, side by side in the plane: what does not meet is spread
 /// over the whole map.
-pub(super) fn sewn(
+pub(crate) fn sewn(
     patch: &Patch,
     drawn: &[[Point2<f64>; 3]],
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Run<'_>,
+    run: &Run<'_>,
 ) -> Result<Polished, Cancelled> {
-    let trial = Trial::new(patch, settings, progress);
+    let trial = Trial::new(patch, settings, run);
     trial.isometric_or(rungs, |rungs| match stretch::stitch(&patch.mesh, &trial.steps.rest, drawn) {
         Ok(start) => trial.polish_or_not(&start, settings.stretch_limit, Rung::Sewn, rungs),
         Err(StretchError::Cancelled(c)) => Err(c),
@@ -208,14 +208,14 @@ pub(super) fn sewn(
 
 /// A part of a chart, where it lies if that is under the limit of single charts, and else minimised by itself. `None` where
 /// that is over it, too: a chart's stretch is a mean over its parts.
-pub(super) fn part_of_chart(
+pub(crate) fn part_of_chart(
     patch: &Patch,
     start: Positions,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Run<'_>,
+    run: &Run<'_>,
 ) -> Result<Option<Flat>, Cancelled> {
-    let trial = Trial::new(patch, settings, progress);
+    let trial = Trial::new(patch, settings, run);
     // Under a limit over the atlas, too: the parts together are stretched no more than the chart was.
     let limit = settings.chart_limit();
     if let Ok(flat) = trial.judge(start.clone(), Some(limit)) {
@@ -229,13 +229,13 @@ pub(super) fn part_of_chart(
 
 /// Flattens a chart's patch anew so that its boundary keeps its distance from itself: from Tutte's
 /// embedding, under the barrier. `None` where that is over the limit.
-pub(super) fn flatten_apart(
+pub(crate) fn flatten_apart(
     patch: &Patch,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Run<'_>,
+    run: &Run<'_>,
 ) -> Result<Option<Flat>, Cancelled> {
-    let trial = Trial::new(patch, settings, progress);
+    let trial = Trial::new(patch, settings, run);
     recover(trial.flatten_apart(Some(settings.stretch_limit), rungs), None)
 }
 
@@ -265,10 +265,10 @@ struct Trial<'a> {
 }
 
 impl<'a> Trial<'a> {
-    fn new(patch: &'a Patch, settings: &'a Settings, progress: &'a Run<'a>) -> Self {
+    fn new(patch: &'a Patch, settings: &'a Settings, run: &'a Run<'a>) -> Self {
         // The same for a patch whatever else the surface holds.
         let seed = settings.seed ^ patch.faces.first().map_or(0, |f| f.index() as u64);
-        Self { patch, settings, seed, steps: Steps::new(&patch.mesh, settings, seed, progress), run: progress }
+        Self { patch, settings, seed, steps: Steps::new(&patch.mesh, settings, seed, run.progress), run }
     }
 
     fn flatten(
@@ -492,7 +492,7 @@ impl<'a> Trial<'a> {
 }
 
 /// Whether so little of a map is stretched so much that nobody sees it blurred.
-pub(super) fn is_sharp(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> bool {
+pub(crate) fn is_sharp(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> bool {
     p99_stretch(mesh, rest, uv) <= MOST_P99_STRETCH
 }
 

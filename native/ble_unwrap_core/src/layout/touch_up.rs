@@ -8,14 +8,11 @@ use rayon::prelude::*;
 
 use crate::charts::Chart;
 use crate::distortion::{self, RestTriangle};
+use crate::flattening::{self, Rung, Rungs};
 use crate::mesh::{Quad, VertexId};
-use crate::progress::Cancelled;
+use crate::progress::{Cancelled, Progress};
 use crate::settings::{LimitOver, Settings};
 use crate::stretch::{self, StretchError};
-
-use super::flatten;
-use super::memo::Run;
-use crate::flattening::{Rung, Rungs};
 
 /// The L2 stretch of a chart may rise by so much for its L-infinity stretch to fall.
 const MOST_RISE: f64 = 1e-3;
@@ -26,7 +23,7 @@ pub(super) fn touch_up(
     charts: Vec<Chart>,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Run<'_>,
+    progress: &Progress,
 ) -> Result<Vec<Chart>, Cancelled> {
     let rise = affordable_rise(&charts, settings);
     let touched: Vec<Result<(Chart, Rungs), Cancelled>> =
@@ -60,7 +57,7 @@ fn touched_up(
     mut chart: Chart,
     rise: f64,
     settings: &Settings,
-    progress: &Run<'_>,
+    progress: &Progress,
 ) -> Result<(Chart, Rungs), Cancelled> {
     progress.check()?;
     let mesh = Arc::clone(&chart.patch.mesh);
@@ -70,20 +67,20 @@ fn touched_up(
     let first = chart.l2;
     let limit = if first > settings.chart_limit() { f64::INFINITY } else { settings.chart_limit() };
     if !quads.is_empty() {
-        let is_allowed = |uv: &[Point2<f64>]| flatten::l2(&chart.patch, &rest, uv) <= limit.min(first + rise);
+        let is_allowed = |uv: &[Point2<f64>]| flattening::l2(&chart.patch, &rest, uv) <= limit.min(first + rise);
         let unbent = stretch::unbend(&mesh, &rest, &quads, &chart.uv, &is_allowed, &settings.stretch, progress);
         if let Some(unbent) = or_nothing(unbent)? {
-            chart.l2 = flatten::l2(&chart.patch, &rest, &unbent.uv);
+            chart.l2 = flattening::l2(&chart.patch, &rest, &unbent.uv);
             chart.uv = unbent.uv;
             rungs.take(Rung::Unbend);
         }
     }
     if settings.coarse {
         let most = limit.min(first + rise).min(chart.l2 + MOST_RISE);
-        let is_allowed = |uv: &[Point2<f64>]| flatten::l2(&chart.patch, &rest, uv) <= most;
+        let is_allowed = |uv: &[Point2<f64>]| flattening::l2(&chart.patch, &rest, uv) <= most;
         let lowered = stretch::lower_peaks(&mesh, &rest, &quads, &chart.uv, &is_allowed, progress);
         if let Some(uv) = or_nothing(lowered)? {
-            chart.l2 = flatten::l2(&chart.patch, &rest, &uv);
+            chart.l2 = flattening::l2(&chart.patch, &rest, &uv);
             chart.uv = uv;
             rungs.take(Rung::Relax);
         }

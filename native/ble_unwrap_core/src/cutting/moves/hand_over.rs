@@ -1,127 +1,93 @@
-//! Borders moved to where a chart is crushed against them.
+//! Polygons handed over a border against which they are squeezed.
 //!
 //! The worst stretch of a chart is often in a few polygons at its border: another part of the border is in their way, or
-//! the border should have run behind them. Such a crest is handed over the border: cut off, glued to the chart beyond,
-//! or to the other side of a cut of its own chart, and unfolded there. The border then runs where the crest was measured.
-//! Nothing else moves, so nothing has to be minimised again.
+//! the border should have run behind them. Such polygons are cut off, glued to the chart beyond, or to the other side of a cut
+//! of their own chart, and unfolded there. The border then runs where they were squeezed most. Nothing else moves, so nothing
+//! has to be minimised again.
 
 use std::collections::BTreeSet;
 
-use nalgebra::{Point2, Vector2};
+use nalgebra::Vector2;
 
-use crate::charts::{Chart, Patch};
+use crate::cache::Run;
+use crate::charts::Chart;
 use crate::distortion::{self, RestTriangle};
-use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
-use crate::progress::{Cancelled, Progress};
-use crate::settings::{Holes, Settings};
-use crate::stretch;
-
-use super::flatten::{self, NEGLIGIBLE};
 use crate::flattening::{Rung, Rungs};
+use crate::mesh::{FaceId, HalfedgeId, TriMesh};
+use crate::progress::Cancelled;
+use crate::settings::Settings;
 
-/// A crest has a face of more L-infinity stretch than this. Over 16 models in several triangulations 2, 2.5 and 3 take 14, 12
-/// and 11 % off the atlases' L-infinity stretch (geometric means) and add 0.8, 0.3 and 0.1 % to their seams.
-const CRUSHED: f64 = 2.5;
-/// It goes as far as the stretch is more than this,
-const CREST: f64 = 2.0;
-/// over no more polygons once it has so many faces.
+use super::super::edit::Edit;
+use super::super::state::{Corners, Cutting};
+use super::super::trial::{Verdict, trial};
+use super::{Proposal, Start};
+
+/// Polygons are handed over if one of their triangles has more L-infinity stretch than this. Over 16 models in several
+/// triangulations 2, 2.5 and 3 take 14, 12 and 11 % off the atlases' L-infinity stretch (geometric means) and add 0.8, 0.3 and
+/// 0.1 % to their seams.
+const SQUEEZED: f64 = 2.5;
+/// The triangles around that one go with it as far as they have more L-infinity stretch than this.
+const SQUEEZED_BESIDE: f64 = 2.0;
+/// No more polygons are added once there are so many triangles.
 const MOST_FACES: usize = 32;
-/// A crest of more triangles, as large polygons have, stays.
+/// Polygons of more triangles altogether, as large polygons have, stay where they are.
 const LARGEST: usize = 256;
-/// Faces of a chart, its worst, at which a crest may begin.
+/// Triangles of a chart, its worst, around which polygons are handed over.
 const MOST_BEGINNINGS: usize = 8;
-/// Ways to hand over a crest that are tried.
+/// Ways to hand over the same polygons that are tried.
 const MOST_WAYS: usize = 3;
-/// It pays where the logarithm of the stretch it began at falls by so many times the share of the chart's boundary that is
+/// It pays where the logarithm of the stretch that it began at falls by so many times the share of the chart's boundary that is
 /// added to the border: a third less stretch for 1 % more of it.
 const PRICE: f64 = 40.0;
 
-/// The charts with their crests handed over. They are made of faces of `mesh` and come sorted by lowest face; those under
-/// the limit stay so, the L2 stretch of all together does not rise, all stay injective, and edges of guides stay borders.
+/// The charts with their squeezed polygons handed over. They are made of faces of `mesh` and come sorted by lowest face; those
+/// under the limit stay so, the L2 stretch of all together does not rise, all stay injective, and edges of guides stay borders.
 /// At most 2 · [`MOST_BEGINNINGS`] · [`MOST_WAYS`] trials a chart, each O(n log n) in the faces of two charts; mostly none.
-pub(super) fn recut(
+pub(crate) fn hand_over(
     mesh: &TriMesh,
     polygon: &[u32],
     charts: Vec<Chart>,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Progress,
+    run: &Run<'_>,
 ) -> Result<Vec<Chart>, Cancelled> {
     if !settings.merge || !settings.wants_darts() {
         return Ok(charts);
     }
     let unit = mesh.halfedges().map(|h| mesh.edge_length(h)).sum::<f64>() / mesh.halfedge_count().max(1) as f64;
-    let place = vec![(usize::MAX, FaceId::NONE); mesh.face_count()];
-    let boundary = vec![0.0; charts.len()];
-    let mut table = Table { mesh, polygon, settings, unit, place, charts, boundary };
-    (0..table.charts.len()).for_each(|i| table.claim(i));
+    let mut borders = Borders { cutting: Cutting::new(mesh, polygon, charts), settings, unit };
     let mut tried = BTreeSet::new();
-    for (before, worst) in table.crushed() {
-        progress.check()?;
+    for (before, worst) in borders.squeezed() {
+        run.progress.check()?;
         // Gone with another.
-        if table.stretch(worst) < before {
+        if borders.stretch(worst) < before {
             continue;
         }
-        let whole = if tried.contains(&worst) { Vec::new() } else { table.crest(worst, CREST) };
-        let alone = table.crest(worst, f64::INFINITY);
-        if table.hand_over(&whole, before) || (alone != whole && table.hand_over(&alone, before)) {
+        let all = if tried.contains(&worst) { Vec::new() } else { borders.squeezed_around(worst, SQUEEZED_BESIDE) };
+        let alone = borders.squeezed_around(worst, f64::INFINITY);
+        if borders.hand_over(&all, before, run)? || (alone != all && borders.hand_over(&alone, before, run)?) {
             rungs.take(Rung::Recut);
         }
-        tried.extend(whole);
+        tried.extend(all);
     }
-    let mut charts = table.charts;
-    charts.sort_by_key(|c| c.patch.faces.iter().min().copied());
-    Ok(charts)
+    Ok(borders.cutting.into_charts())
 }
 
-/// The corners of a face in the plane.
-type Corners = [Point2<f64>; 3];
-
-struct Table<'a> {
-    mesh: &'a TriMesh,
-    polygon: &'a [u32],
+struct Borders<'a> {
+    cutting: Cutting<'a>,
     settings: &'a Settings,
     /// Mean length of an edge.
     unit: f64,
-    /// The chart of each face, and its number there.
-    place: Vec<(usize, FaceId)>,
-    charts: Vec<Chart>,
-    /// Lengths of the charts' boundaries.
-    boundary: Vec<f64>,
 }
 
-impl Table<'_> {
-    /// Enters the faces of a chart.
-    fn claim(&mut self, i: usize) {
-        for (local, f) in self.charts[i].patch.faces.iter().enumerate() {
-            self.place[f.index()] = (i, FaceId::new(local));
-        }
-        self.boundary[i] = self.charts[i].patch.mesh.boundary_length();
-    }
-
-    /// The charts on both sides of an edge.
-    fn sides(&self, h: HalfedgeId) -> [usize; 2] {
-        [h, self.mesh.twin(h)].map(|h| self.place[h.face().index()].0)
-    }
-
-    /// Whether a half-edge of the mesh is on the boundary of its chart.
-    fn is_border(&self, h: HalfedgeId) -> bool {
-        let (i, local) = self.place[h.face().index()];
-        self.charts[i].patch.mesh.is_boundary(local.halfedge(h.slot()))
-    }
-
-    fn corners(&self, f: FaceId) -> Corners {
-        let (i, local) = self.place[f.index()];
-        self.charts[i].patch.mesh.triangle(local).map(|v| self.charts[i].uv[v.index()])
-    }
-
+impl Borders<'_> {
     fn rest(&self, f: FaceId) -> RestTriangle {
-        RestTriangle::new(self.mesh.triangle_positions(f), self.unit)
+        RestTriangle::new(self.cutting.mesh().triangle_positions(f), self.unit)
     }
 
     /// L-infinity stretch of a face; charts are as large as their surface.
     fn stretch(&self, f: FaceId) -> f64 {
-        self.stretch_at(f, self.corners(f))
+        self.stretch_at(f, self.cutting.corners(f))
     }
 
     fn stretch_at(&self, f: FaceId, corners: Corners) -> f64 {
@@ -129,36 +95,37 @@ impl Table<'_> {
     }
 
     fn length(&self, edges: &[HalfedgeId]) -> f64 {
-        edges.iter().map(|&h| self.mesh.edge_length(h)).sum()
+        edges.iter().map(|&h| self.cutting.mesh().edge_length(h)).sum()
     }
 
-    /// The most crushed faces at the border of each chart, worst of all first, and how much they are.
-    fn crushed(&self) -> Vec<(f64, FaceId)> {
+    /// The most squeezed faces at the border of each chart, worst of all first, and how much they are.
+    fn squeezed(&self) -> Vec<(f64, FaceId)> {
         let worst_first = |a: &(f64, FaceId), b: &(f64, FaceId)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
-        let mut crushed = Vec::new();
-        for chart in self.charts.iter().filter(|c| c.l2 <= self.settings.stretch_limit) {
+        let charts = self.cutting.ids().filter_map(|id| self.cutting.chart(id));
+        let mut squeezed = Vec::new();
+        for chart in charts.filter(|c| c.l2 <= self.settings.stretch_limit) {
             let (mesh, names) = (&chart.patch.mesh, &chart.patch.faces);
             let at_border = |f: &FaceId| mesh.triangle(*f).iter().any(|&v| mesh.is_boundary_vertex(v));
             let measured = mesh.faces().filter(at_border).map(|f| (self.stretch(names[f.index()]), names[f.index()]));
-            let mut own: Vec<(f64, FaceId)> = measured.filter(|s| s.0 > CRUSHED).collect();
+            let mut own: Vec<(f64, FaceId)> = measured.filter(|s| s.0 > SQUEEZED).collect();
             own.sort_by(worst_first);
             own.truncate(MOST_BEGINNINGS);
-            crushed.extend(own);
+            squeezed.extend(own);
         }
-        crushed.sort_by(worst_first);
-        crushed
+        squeezed.sort_by(worst_first);
+        squeezed
     }
 
     /// A face with those that hang together with it in its chart and are stretched more than this, by whole polygons,
     /// ascending; none where these are large.
-    fn crest(&self, worst: FaceId, least: f64) -> Vec<FaceId> {
+    fn squeezed_around(&self, worst: FaceId, least: f64) -> Vec<FaceId> {
         let mut faces = vec![worst];
         let mut at = 0;
         while at < faces.len() {
             let has_room = faces.len() < MOST_FACES;
-            for h in faces[at].halfedges().into_iter().filter(|&h| !self.is_border(h)) {
-                let next = self.mesh.twin(h).face();
-                let is_same = self.polygon[h.face().index()] == self.polygon[next.index()];
+            for h in faces[at].halfedges().into_iter().filter(|&h| !self.cutting.is_seam(h)) {
+                let next = self.cutting.mesh().twin(h).face();
+                let is_same = self.cutting.polygon(h.face()) == self.cutting.polygon(next);
                 if !faces.contains(&next) && (is_same || (has_room && self.stretch(next) > least)) {
                     faces.push(next);
                 }
@@ -172,33 +139,31 @@ impl Table<'_> {
         faces
     }
 
-    /// Hands a crest over the border where that pays.
-    fn hand_over(&mut self, crest: &[FaceId], before: f64) -> bool {
-        let Some((way, changed)) = self.ways(crest).into_iter().find_map(|way| {
-            let changed = self.handed_over(crest, &way, before)?;
-            Some((way, changed))
-        }) else {
-            return false;
-        };
-        for (i, chart) in self.sides(way[0]).into_iter().zip(changed) {
-            if let Some(chart) = chart {
-                self.charts[i] = chart;
-                self.claim(i);
+    /// Hands faces over the border where that pays.
+    fn hand_over(&mut self, faces: &[FaceId], before: f64, run: &Run<'_>) -> Result<bool, Cancelled> {
+        for way in self.ways(faces) {
+            let Some(proposal) = self.proposal(faces, &way, before) else { continue };
+            let verdict = trial(&self.cutting, &proposal, self.settings, &mut Rungs::default(), run)?;
+            let Verdict::Charts(charts) = verdict else { continue };
+            let old = proposal.edit.charts(&self.cutting);
+            if charts.len() == old.len() && self.pays(faces, &way, before, &charts) {
+                self.cutting.replace(&old, charts);
+                return Ok(true);
             }
         }
-        true
+        Ok(false)
     }
 
-    /// Along which edges of its outline a crest may be glued to what lies beyond: all towards one chart, or the longest of
+    /// Along which edges of their outline faces may be glued to what lies beyond: all towards one chart, or the longest of
     /// them, longest first.
-    fn ways(&self, crest: &[FaceId]) -> Vec<Vec<HalfedgeId>> {
-        let mesh = self.mesh;
+    fn ways(&self, faces: &[FaceId]) -> Vec<Vec<HalfedgeId>> {
+        let mesh = self.cutting.mesh();
         let is_way = |h: &HalfedgeId| {
             let t = mesh.twin(*h);
-            !t.is_none() && self.is_border(*h) && !mesh.is_guide(*h) && !is_in(crest, t.face())
+            !t.is_none() && self.cutting.is_seam(*h) && !mesh.is_guide(*h) && !is_in(faces, t.face())
         };
-        let beyond = |h: HalfedgeId| self.sides(h)[1];
-        let mut edges: Vec<HalfedgeId> = crest.iter().flat_map(|f| f.halfedges()).filter(is_way).collect();
+        let beyond = |h: HalfedgeId| self.cutting.owner(mesh.twin(h).face());
+        let mut edges: Vec<HalfedgeId> = faces.iter().flat_map(|f| f.halfedges()).filter(is_way).collect();
         edges.sort_by(|&g, &h| {
             let longest_first = mesh.edge_length(h).total_cmp(&mesh.edge_length(g));
             beyond(g).cmp(&beyond(h)).then(longest_first).then(g.cmp(&h))
@@ -211,46 +176,50 @@ impl Table<'_> {
         ways
     }
 
-    /// What becomes of the chart of a crest, unless it stays in that, and of the chart that it goes to. `None` where that
-    /// does not pay or makes no chart.
-    fn handed_over(&self, crest: &[FaceId], way: &[HalfedgeId], before: f64) -> Option<[Option<Chart>; 2]> {
-        let mesh = self.mesh;
-        let [a, b] = self.sides(way[0]);
-        let is_new = |h: &HalfedgeId| !self.is_border(*h) && !is_in(crest, mesh.twin(*h).face());
-        let new: Vec<HalfedgeId> = crest.iter().flat_map(|f| f.halfedges()).filter(is_new).collect();
-        let added = (self.length(&new) - self.length(way)) / self.boundary[a];
-        let pays = |after: f64| after < before && (before / after).ln() >= PRICE * added;
-        let stays: Vec<FaceId> = self.charts[a].patch.faces.iter().copied().filter(|f| !is_in(crest, *f)).collect();
-        if stays.is_empty() || !pays(1.0) {
-            return None;
-        }
-        let is_cut = |h: HalfedgeId| {
-            let t = mesh.twin(h);
-            let is_outline = is_in(crest, h.face()) != is_in(crest, t.face());
-            if is_outline { !way.contains(&h) && !way.contains(&t) } else { self.is_border(h) }
-        };
-        let cut_out = |faces: Vec<FaceId>| Patch::cut_out(mesh, self.polygon, faces, is_cut);
-        let mut faces = self.charts[b].patch.faces.clone();
-        if a != b {
-            faces.extend_from_slice(crest);
-            faces.sort_unstable();
-        }
-        let to = self.lying(cut_out(faces), &self.unfolded(crest, way[0]))?;
-        let drawn = to.patch.faces.iter().zip(to.patch.mesh.triangles()).filter(|(f, _)| is_in(crest, **f));
-        let after = drawn.map(|(f, t)| self.stretch_at(*f, t.map(|v| to.uv[v.index()]))).fold(0.0, f64::max);
-        if !pays(after) {
-            return None;
-        }
-        let from = if a == b { None } else { Some(self.lying(cut_out(stays), &[])?) };
-        let energy = |c: &Chart| c.patch.area() * c.l2.powi(2);
-        let old = if a == b { energy(&self.charts[a]) } else { energy(&self.charts[a]) + energy(&self.charts[b]) };
-        (energy(&to) + from.as_ref().map_or(0.0, energy) <= old).then_some([from, Some(to)])
+    /// The edges inside the chart of faces along which they are cut off.
+    fn cut_off(&self, faces: &[FaceId]) -> Vec<HalfedgeId> {
+        let is_new = |h: &HalfedgeId| !self.cutting.is_seam(*h) && !is_in(faces, self.cutting.mesh().twin(*h).face());
+        faces.iter().flat_map(|f| f.halfedges()).filter(is_new).collect()
     }
 
-    /// A crest unfolded from the other side of an edge of its outline; by face.
-    fn unfolded(&self, crest: &[FaceId], first: HalfedgeId) -> Vec<(FaceId, Corners)> {
-        let twin = self.mesh.twin(first);
-        let beyond = self.corners(twin.face());
+    /// Whether the stretch falls by enough for the border that is added.
+    fn falls(&self, faces: &[FaceId], way: &[HalfedgeId], before: f64, after: f64) -> bool {
+        let owner = faces.first().and_then(|f| self.cutting.owner(*f));
+        let Some(chart) = owner.and_then(|id| self.cutting.chart(id)) else { return false };
+        let added = (self.length(&self.cut_off(faces)) - self.length(way)) / chart.patch.mesh.boundary_length();
+        after < before && (before / after).ln() >= PRICE * added
+    }
+
+    /// Faces cut off, glued along a way, and unfolded there. `None` where that cannot pay, or would leave nothing of their chart.
+    fn proposal(&self, faces: &[FaceId], way: &[HalfedgeId], before: f64) -> Option<Proposal> {
+        let owner = self.cutting.owner(way[0].face())?;
+        if self.cutting.face_count(owner) == faces.len() || !self.falls(faces, way, before, 1.0) {
+            return None;
+        }
+        let edit = Edit::new(self.cutting.mesh(), way, &self.cut_off(faces));
+        Some(Proposal { edit, start: Start::Redrawn(self.unfolded(faces, way[0])) })
+    }
+
+    /// Whether charts with the faces handed over are worth what they cost, and have no more L2 stretch together.
+    fn pays(&self, faces: &[FaceId], way: &[HalfedgeId], before: f64, charts: &[Chart]) -> bool {
+        let mut after: f64 = 0.0;
+        for chart in charts {
+            for (f, t) in chart.patch.faces.iter().zip(chart.patch.mesh.triangles()).filter(|(f, _)| is_in(faces, **f))
+            {
+                after = after.max(self.stretch_at(*f, t.map(|v| chart.uv[v.index()])));
+            }
+        }
+        let energy = |c: &Chart| c.patch.area() * c.l2.powi(2);
+        let mut old: Vec<_> = self.cutting.sides(way[0]).into_iter().flatten().collect();
+        old.dedup();
+        let old: f64 = old.into_iter().filter_map(|id| self.cutting.chart(id)).map(energy).sum();
+        self.falls(faces, way, before, after) && charts.iter().map(energy).sum::<f64>() <= old
+    }
+
+    /// Faces unfolded from the other side of an edge of their outline; ascending.
+    fn unfolded(&self, faces: &[FaceId], first: HalfedgeId) -> Vec<(FaceId, Corners)> {
+        let twin = self.cutting.mesh().twin(first);
+        let beyond = self.cutting.corners(twin.face());
         let mut drawn: Vec<(FaceId, Corners)> = Vec::new();
         let mut open = vec![(first, [beyond[(twin.slot() + 1) % 3], beyond[twin.slot()]])];
         while let Some((h, [p, q])) = open.pop() {
@@ -267,38 +236,15 @@ impl Table<'_> {
             corners[h.slot()] = p;
             corners[(h.slot() + 1) % 3] = q;
             drawn.push((f, corners));
-            for g in f.halfedges().into_iter().filter(|&g| !self.is_border(g)) {
-                let t = self.mesh.twin(g);
-                if is_in(crest, t.face()) {
+            for g in f.halfedges().into_iter().filter(|&g| !self.cutting.is_seam(g)) {
+                let t = self.cutting.mesh().twin(g);
+                if is_in(faces, t.face()) {
                     open.push((t, [corners[(g.slot() + 1) % 3], corners[g.slot()]]));
                 }
             }
         }
         drawn.sort_by_key(|d| d.0);
         drawn
-    }
-
-    /// A patch as a chart whose faces lie where they lay, but for those drawn anew. `None` where that is not injective or
-    /// over the limit.
-    fn lying(&self, patch: Patch, drawn: &[(FaceId, Corners)]) -> Option<Chart> {
-        let mesh = &patch.mesh;
-        let topology = mesh.topology();
-        if !topology.is_chart() || (self.settings.holes == Holes::Cut && !topology.is_disk()) {
-            return None;
-        }
-        let mut uv = vec![Point2::origin(); mesh.vertex_count()];
-        let mut put = |t: &[VertexId; 3], corners: Corners| t.iter().zip(corners).for_each(|(v, p)| uv[v.index()] = p);
-        let anew = |f: &FaceId| drawn.binary_search_by_key(f, |d| d.0).ok().map(|at| drawn[at].1);
-        let faces = || patch.faces.iter().zip(mesh.triangles());
-        faces().filter_map(|(f, t)| Some((t, anew(f)?))).for_each(|(t, corners)| put(t, corners));
-        // What has been there stays, so it comes last.
-        faces().filter(|(f, _)| anew(f).is_none()).for_each(|(f, t)| put(t, self.corners(*f)));
-        if stretch::first_flip(mesh, &uv).is_some() || !stretch::boundary_is_simple(mesh, &uv) {
-            return None;
-        }
-        let l2 = stretch::l2_of_positions(mesh, &uv, NEGLIGIBLE);
-        let good = l2 <= self.settings.stretch_limit && flatten::is_sharp(mesh, &RestTriangle::of_mesh(mesh), &uv);
-        good.then_some(Chart { patch, uv, l2 })
     }
 }
 
@@ -310,9 +256,14 @@ fn is_in(faces: &[FaceId], face: FaceId) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::charts::Patch;
+    use crate::flattening::{self, NEGLIGIBLE};
+    use crate::mesh::VertexId;
     use crate::mesh::test_surfaces;
+    use crate::progress::Progress;
     use crate::settings::NEVER_SEWN;
-    use nalgebra::{Point3, Vector3};
+    use crate::stretch;
+    use nalgebra::{Point2, Point3, Vector3};
 
     /// Positions along x and y of a vertex in the plane.
     type Place<'a> = &'a dyn Fn(Point3<f64>) -> Point2<f64>;
@@ -355,10 +306,16 @@ mod tests {
         Settings { stretch_limit: 2.0, ..Settings::default() }
     }
 
-    /// The charts recut, and how often; checks that they are whole and injective.
-    fn recut_all(mesh: &TriMesh, polygon: &[u32], charts: Vec<Chart>, settings: &Settings) -> (Vec<Chart>, usize) {
+    /// The charts after handing over, and how often that was done; checks that they are whole and injective.
+    fn all_handed_over(
+        mesh: &TriMesh,
+        polygon: &[u32],
+        charts: Vec<Chart>,
+        settings: &Settings,
+    ) -> (Vec<Chart>, usize) {
         let mut rungs = Rungs::default();
-        let charts = recut(mesh, polygon, charts, settings, &mut rungs, &Progress::new()).expect("not cancelled");
+        let charts = hand_over(mesh, polygon, charts, settings, &mut rungs, &Run::new(&Progress::new(), None))
+            .expect("not cancelled");
         let mut faces: Vec<FaceId> = charts.iter().flat_map(|c| c.patch.faces.iter().copied()).collect();
         faces.sort_unstable();
         assert!(faces.into_iter().eq(mesh.faces()), "each face once");
@@ -382,12 +339,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_crushed_at_a_border_goes_to_the_chart_beyond() {
+    fn what_is_squeezed_at_a_border_goes_to_the_chart_beyond() {
         let mesh = sheet();
         let all = triangles(&mesh);
         let before = charts(&mesh, &all, |p| p.x < 20.0, [&pushed, &flat]);
         assert!(worst(&before) > 5.0);
-        let (after, times) = recut_all(&mesh, &all, before.clone(), &settings());
+        let (after, times) = all_handed_over(&mesh, &all, before.clone(), &settings());
         assert_eq!(times, 1);
         // The two thin triangles at the pushed vertex lie flat beyond.
         let faces = |charts: &[Chart]| charts.iter().map(|c| c.patch.faces.len()).collect::<Vec<_>>();
@@ -401,7 +358,7 @@ mod tests {
         let mesh = sheet();
         let quads: Vec<u32> = (0..mesh.face_count() as u32).map(|f| f / 2).collect();
         let before = charts(&mesh, &quads, |p| p.x < 20.0, [&pushed, &flat]);
-        let (after, times) = recut_all(&mesh, &quads, before, &settings());
+        let (after, times) = all_handed_over(&mesh, &quads, before, &settings());
         assert_eq!((times, after[1].patch.faces.len()), (1, 1604), "two squares");
         assert!((worst(&after) - 1.0).abs() < 1e-9);
     }
@@ -413,7 +370,7 @@ mod tests {
         let on_cut = |v| mesh.position(v).y.abs() < 1e-9 && mesh.position(v).x > 0.0;
         let cut: Vec<_> = mesh.edges().filter(|&h| on_cut(mesh.from(h)) && on_cut(mesh.to(h))).collect();
         let patch = Patch::whole(mesh.clone().into(), all.clone()).cut(&cut);
-        let flat = flatten::isometric(&patch, &mut Rungs::default()).expect("it unrolls");
+        let flat = flattening::isometric(&patch, &mut Rungs::default()).expect("it unrolls");
         let mut chart = flat.into_chart(patch);
         // A vertex in the middle of one side, moved in by three quarters of an edge.
         let loops = chart.patch.mesh.boundary_loops();
@@ -430,34 +387,35 @@ mod tests {
         chart.l2 = stretch::l2_of_positions(&chart.patch.mesh, &chart.uv, NEGLIGIBLE);
         let before = vec![chart];
         assert!(worst(&before) > 2.5, "{}", worst(&before));
-        let (after, times) = recut_all(&mesh, &all, before.clone(), &settings());
+        let (after, times) = all_handed_over(&mesh, &all, before.clone(), &settings());
         assert_eq!((times, after.len()), (1, 1));
         assert!(worst(&after) < 0.7 * worst(&before), "{} {}", worst(&before), worst(&after));
     }
 
     #[test]
-    fn nothing_moves_where_nothing_is_crushed_or_a_guide_runs_or_it_is_not_wanted() {
+    fn nothing_moves_where_nothing_is_squeezed_or_a_guide_runs_or_it_is_not_wanted() {
         let mesh = sheet();
         let all = triangles(&mesh);
         let wide = |p: Point3<f64>| Point2::new(1.4 * p.x, p.y / 1.4);
         let even = charts(&mesh, &all, |p| p.x < 20.0, [&wide, &flat]);
-        assert_eq!(recut_all(&mesh, &all, even, &settings()).1, 0);
+        assert_eq!(all_handed_over(&mesh, &all, even, &settings()).1, 0);
         let on_border = |h: HalfedgeId| [mesh.from(h), mesh.to(h)].iter().all(|v| mesh.position(*v).x == 20.0);
         let guided = mesh.clone().with_guides(mesh.halfedges().map(on_border).collect());
-        let crushed = |mesh: &TriMesh| charts(mesh, &all, |p| p.x < 20.0, [&pushed, &flat]);
-        assert_eq!(recut_all(&guided, &all, crushed(&guided), &settings()).1, 0);
+        let squeezed = |mesh: &TriMesh| charts(mesh, &all, |p| p.x < 20.0, [&pushed, &flat]);
+        assert_eq!(all_handed_over(&guided, &all, squeezed(&guided), &settings()).1, 0);
         let apart = Settings { merge: false, ..settings() };
         let no_darts = Settings { least_sewn: NEVER_SEWN, ..settings() };
         let over = Settings { stretch_limit: 1.0 + 1e-6, ..settings() };
         for settings in [apart, no_darts, over] {
             let mut rungs = Rungs::default();
-            let charts = recut(&mesh, &all, crushed(&mesh), &settings, &mut rungs, &Progress::new());
+            let charts =
+                hand_over(&mesh, &all, squeezed(&mesh), &settings, &mut rungs, &Run::new(&Progress::new(), None));
             assert!(charts.is_ok() && rungs.taken().is_empty());
         }
     }
 
     #[test]
-    fn a_crest_stays_where_it_would_lie_on_the_border_beyond() {
+    fn polygons_stay_where_they_would_lie_on_the_border_beyond() {
         let mesh = sheet();
         let all = triangles(&mesh);
         // A window drawn flat, in the shape of an L, leaves no more room than its own panes fill.
@@ -467,11 +425,11 @@ mod tests {
         };
         let before = charts(&mesh, &all, window, [&pushed, &flat]);
         assert!(worst(&before) > 5.0);
-        assert_eq!(recut_all(&mesh, &all, before, &settings()).1, 0);
+        assert_eq!(all_handed_over(&mesh, &all, before, &settings()).1, 0);
     }
 
     #[test]
-    fn whatever_is_crushed_the_charts_stay_sound_and_the_worst_stretch_does_not_grow() {
+    fn whatever_is_squeezed_the_charts_stay_sound_and_the_worst_stretch_does_not_grow() {
         let mesh = test_surfaces::grid(16, 24, [16.0, 24.0], 0.1);
         let all = triangles(&mesh);
         let mut moved = 0;
@@ -489,11 +447,11 @@ mod tests {
                 continue;
             }
             let settings = Settings { stretch_limit: 3.0, ..settings() };
-            let (after, times) = recut_all(&mesh, &all, before.clone(), &settings);
+            let (after, times) = all_handed_over(&mesh, &all, before.clone(), &settings);
             moved += times;
             let energy = |charts: &[Chart]| charts.iter().map(|c| c.patch.area() * c.l2.powi(2)).sum::<f64>();
             assert!(energy(&after) <= energy(&before) * (1.0 + 1e-12));
-            // Measured at each chart's own scale, which the crest has a small part in.
+            // Measured at each chart's own scale, in which what is handed over has a small part.
             assert!(worst(&after) <= 1.05 * worst(&before), "{} {}", worst(&before), worst(&after));
         }
         assert!(moved > 5, "{moved}");

@@ -7,26 +7,28 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point2, Vector2};
 
+use crate::cache::Run;
 use crate::charts::{Chart, Patch};
+use crate::flattening::{Rung, Rungs};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh, VertexId};
 use crate::progress::Cancelled;
 use crate::segmentation;
-use crate::settings::{Holes, Settings};
+use crate::settings::Settings;
 
-use super::flatten;
-use super::memo::Run;
-use crate::flattening::{Rung, Rungs};
+use super::super::edit::Edit;
+use super::super::state::{ChartId, Cutting};
+use super::super::trial::{Verdict, trial};
+use super::{Proposal, Start};
 
-/// A chart is cut if a texture that holds it, whatever its turn, can be filled to no more than this share by all charts, or
+/// A chart is cut if a texture that holds it, whatever its turn, can be filled to no more than this share by all charts.
 const LEAST_FILL: f64 = 0.25;
-/// than this if it is a body that was cut open, with seams all round: there one more shows less than across a plank. Over 16
-/// models 0.25, 0.4 and 0.5 give 3.18, 3.36 and 3.78 charts, seams of 3.20, 3.24 and 3.36 (geometric means), and fill 0.546,
-/// 0.567 and 0.584 of the texture.
+/// The same for a body that was cut open, with seams all round: there one more shows less than across a plank. Over 16 models 0.25,
+/// 0.4 and 0.5 give 3.18, 3.36 and 3.78 charts, seams of 3.20, 3.24 and 3.36 (geometric means), and fill 0.546, 0.567 and 0.584 of
+/// the texture.
 const LEAST_FILL_OF_BODIES: f64 = 0.4;
-/// Share of its boundary along which such a body borders on itself.
+/// A body that was cut open borders on itself along at least this share of its boundary.
 const LEAST_SELF_BORDER: f64 = 0.5;
-/// Its parts are cut,
-/// too, until it can be filled to this.
+/// A chart that is cut at all, and its parts, are cut until a texture that holds them can be filled to this share.
 const GOOD_FILL: f64 = 0.6;
 /// The cut runs in so much of the length around the middle.
 const MIDDLE: [f64; 2] = [0.4, 0.6];
@@ -42,43 +44,41 @@ const DIRECTIONS: usize = 24;
 /// Cuts in two, one after the other, that a part comes out of at most.
 const MOST_CUTS: usize = 6;
 
-/// The charts, with those cut across that are too long for the texture of `settings`. All parts stay under the limit, and
-/// lie where they lay in their chart but for what that takes. Sorted by lowest face. O(n log n).
-pub(super) fn cut(
+/// The charts of a surface, with those cut across that are too long for the texture of `settings`. All parts stay under the limit,
+/// and lie where they lay in their chart but for what that takes. Sorted by lowest face. O(n log n).
+pub(crate) fn cut_across(
+    mesh: &TriMesh,
+    polygon: &[u32],
     charts: Vec<Chart>,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Run<'_>,
+    run: &Run<'_>,
 ) -> Result<Vec<Chart>, Cancelled> {
     let area: f64 = charts.iter().map(|c| c.patch.area()).sum();
     let texture = [settings.packing.width, settings.packing.height].map(f64::from);
-    let most_filled = |uv: &[Point2<f64>]| area / (texture[0] * texture[1] * hold(uv, texture).powi(2));
-    let mut done = Vec::new();
-    for chart in charts {
-        progress.check()?;
-        let least = if self_border(&chart) > LEAST_SELF_BORDER { LEAST_FILL_OF_BODIES } else { LEAST_FILL };
-        if most_filled(&chart.uv) > least {
-            done.push(chart);
+    let most_filled = |chart: &Chart| area / (texture[0] * texture[1] * hold(&chart.uv, texture).powi(2));
+    let mut cutting = Cutting::new(mesh, polygon, charts);
+    let is_too_long = |chart: &Chart| {
+        let least = if self_border(chart) > LEAST_SELF_BORDER { LEAST_FILL_OF_BODIES } else { LEAST_FILL };
+        most_filled(chart) <= least
+    };
+    let too_long = |id: &ChartId| cutting.chart(*id).is_some_and(is_too_long);
+    let mut open: Vec<(ChartId, usize)> = cutting.ids().filter(too_long).map(|id| (id, 0)).collect();
+    while let Some((id, cuts)) = open.pop() {
+        run.progress.check()?;
+        let Some(chart) = cutting.chart(id).filter(|chart| cuts < MOST_CUTS && most_filled(chart) <= GOOD_FILL) else {
             continue;
-        }
-        let mut open = vec![(chart, 0)];
-        while let Some((chart, cuts)) = open.pop() {
-            if most_filled(&chart.uv) > GOOD_FILL || cuts == MOST_CUTS {
-                done.push(chart);
-                continue;
-            }
-            let largest = LEAST_GAIN * hold(&chart.uv, texture);
-            match halves(&chart, settings, rungs, progress)? {
-                Some(parts) if parts.iter().all(|part| hold(&part.uv, texture) <= largest) => {
-                    rungs.take(Rung::Split);
-                    open.extend(parts.into_iter().map(|part| (part, cuts + 1)));
-                }
-                _ => done.push(chart),
-            }
+        };
+        let largest = LEAST_GAIN * hold(&chart.uv, texture);
+        let Some(proposal) = proposal(&cutting, chart, settings, run)? else { continue };
+        if let Verdict::Charts(parts) = trial(&cutting, &proposal, settings, rungs, run)?
+            && parts.iter().all(|part| hold(&part.uv, texture) <= largest)
+        {
+            rungs.take(Rung::Split);
+            open.extend(cutting.replace(&[id], parts).into_iter().map(|part| (part, cuts + 1)));
         }
     }
-    done.sort_by_key(|c| c.patch.faces.iter().min().copied());
-    Ok(done)
+    Ok(cutting.into_charts())
 }
 
 /// Share of a chart's boundary where it has been cut open: two sides of the same edge of the surface.
@@ -129,36 +129,27 @@ fn range(uv: &[Point2<f64>], along: Vector2<f64>) -> (f64, f64) {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)))
 }
 
-/// A chart cut across near the middle of its length; `None` where that is impossible, takes a part over the limit, or
-/// where the cut would be longer than the chart is wide, as it is where no polygon ends near the middle.
-fn halves(
+/// A cut across a chart near the middle of its length; `None` where there is none, or where it would be longer than the chart is
+/// wide, as it is where no polygon ends near the middle.
+fn proposal(
+    cutting: &Cutting<'_>,
     chart: &Chart,
     settings: &Settings,
-    rungs: &mut Rungs,
-    progress: &Run<'_>,
-) -> Result<Option<Vec<Chart>>, Cancelled> {
+    run: &Run<'_>,
+) -> Result<Option<Proposal>, Cancelled> {
     let (patch, uv) = (&chart.patch, &chart.uv);
     let along = axis(uv);
     let ends = ends(patch, uv, along);
     let crease_weight = settings.segmentation.crease_weight;
-    let parts = segmentation::between(&patch.mesh, &patch.polygon, [&ends[0], &ends[1]], crease_weight, progress)?;
+    let parts = segmentation::between(&patch.mesh, &patch.polygon, [&ends[0], &ends[1]], crease_weight, run.progress)?;
     let Some(parts) = parts else { return Ok(None) };
+    let border = border(&patch.mesh, &parts.label);
     let mean_width = patch.area() / extent(uv, along);
-    if border_length(&patch.mesh, &parts.label) > MOST_CUT * mean_width {
+    if border.iter().map(|&h| patch.mesh.edge_length(h)).sum::<f64>() > MOST_CUT * mean_width {
         return Ok(None);
     }
-    let mut charts = Vec::new();
-    for (part, start) in with_positions(patch, uv, &parts.label, parts.parts) {
-        let topology = part.mesh.topology();
-        if !topology.is_chart() || (settings.holes != Holes::Keep && topology.loops > 1) {
-            return Ok(None);
-        }
-        match flatten::part_of_chart(&part, start, settings, rungs, progress)? {
-            Some(flat) => charts.push(flat.into_chart(part)),
-            None => return Ok(None),
-        }
-    }
-    Ok(Some(charts))
+    let open: Vec<HalfedgeId> = border.iter().map(|h| patch.faces[h.face().index()].halfedge(h.slot())).collect();
+    Ok(Some(Proposal { edit: Edit::new(cutting.mesh(), &[], &open), start: Start::Lying }))
 }
 
 /// The faces at either end of a chart, between which it may be cut: those of polygons that lie beyond the middle, or reach into it from
@@ -183,32 +174,10 @@ fn ends(patch: &Patch, uv: &[Point2<f64>], along: Vector2<f64>) -> [Vec<FaceId>;
     [faces_of(&|[first, last]| first < begin && last <= end), faces_of(&|[first, last]| first >= begin && last > end)]
 }
 
-/// Length of the border between parts of a mesh.
-fn border_length(mesh: &TriMesh, label: &[u32]) -> f64 {
+/// The edges between parts of a mesh.
+fn border(mesh: &TriMesh, label: &[u32]) -> Vec<HalfedgeId> {
     let parts = |h: HalfedgeId| label[h.face().index()] != label[mesh.twin(h).face().index()];
-    mesh.edges().filter(|&h| !mesh.is_boundary(h) && parts(h)).map(|h| mesh.edge_length(h)).sum()
-}
-
-/// The parts of a patch by label, each with the positions of its vertices.
-fn with_positions(
-    patch: &Patch,
-    uv: &[Point2<f64>],
-    label: &[u32],
-    count: usize,
-) -> impl Iterator<Item = (Patch, Vec<Point2<f64>>)> {
-    let mut faces = vec![Vec::new(); count];
-    for (f, label) in patch.mesh.faces().zip(label) {
-        faces[*label as usize].push(f);
-    }
-    patch.split(label, count).into_iter().zip(faces).map(|(part, faces)| {
-        let mut own = vec![Point2::origin(); part.mesh.vertex_count()];
-        for (corners, f) in part.mesh.triangles().iter().zip(faces) {
-            for (v, w) in corners.iter().zip(patch.mesh.triangle(f)) {
-                own[v.index()] = uv[w.index()];
-            }
-        }
-        (part, own)
-    })
+    mesh.edges().filter(|&h| !mesh.is_boundary(h) && parts(h)).collect()
 }
 
 #[cfg(test)]
@@ -239,10 +208,30 @@ mod tests {
         Chart { patch, uv, l2: 1.0 }
     }
 
+    /// Charts, each of a mesh of its own, as charts of one mesh, cut across.
     fn cut_up(charts: Vec<Chart>) -> Vec<Chart> {
-        let progress = Progress::new();
-        let run = Run::new(&progress, None);
-        cut(charts, &Settings::default(), &mut Rungs::default(), &run).expect("not cancelled")
+        let (mut positions, mut triangles, mut starts) = (Vec::new(), Vec::new(), Vec::new());
+        for chart in &charts {
+            let (mesh, first) = (&chart.patch.mesh, positions.len() as u32);
+            starts.push(triangles.len());
+            triangles.extend(mesh.triangles().iter().map(|t| t.map(|v| first + v.index() as u32)));
+            positions.extend_from_slice(mesh.positions());
+        }
+        let mesh = test_surfaces::mesh(&positions, &triangles);
+        let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
+        let named = |(mut chart, first): (Chart, usize)| {
+            chart.patch.faces = (first..first + chart.patch.faces.len()).map(FaceId::new).collect();
+            chart.patch.polygon = chart.patch.faces.iter().map(|f| f.index() as u32).collect();
+            chart
+        };
+        let charts = charts.into_iter().zip(starts).map(named).collect();
+        cut_on(&mesh, &polygon, charts)
+    }
+
+    fn cut_on(mesh: &TriMesh, polygon: &[u32], charts: Vec<Chart>) -> Vec<Chart> {
+        let (progress, mut rungs) = (Progress::new(), Rungs::default());
+        let (settings, run) = (Settings::default(), Run::new(&progress, None));
+        cut_across(mesh, polygon, charts, &settings, &mut rungs, &run).expect("not cancelled")
     }
 
     #[test]
@@ -264,13 +253,26 @@ mod tests {
     fn a_body_cut_open_is_cut_sooner_than_a_sheet_of_its_shape() {
         let sheet = sheet_of(10, 4);
         assert!(self_border(&sheet) == 0.0);
-        // A tube of that length, unrolled: its ends are its own border, its sides the two sides of the cut.
-        let mut tube = sheet.clone();
-        let seam = |p: &Point3<f64>| p.y == 0.0 || p.y == 2.0;
-        let name = |(i, p): (usize, &Point3<f64>)| VertexId::new(if seam(p) { 1000 + p.x as usize } else { i });
-        tube.patch.vertices = tube.patch.mesh.positions().iter().enumerate().map(name).collect();
-        assert!((self_border(&tube) - 20.0 / 24.0).abs() < 1e-9);
-        assert_eq!((cut_up(vec![sheet]).len(), cut_up(vec![tube]).len()), (1, 2));
+        // A square tube of that length and as wide around, unrolled: its ends are its own border, its sides the two of the cut.
+        let corner = |k: usize| [[0.0, 0.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]][k % 4];
+        let places = sheet.patch.mesh.positions().iter().map(|p| (p.x as usize, (2.0 * p.y) as usize));
+        let ring: Vec<(usize, usize)> = places.collect();
+        let name = |v: VertexId| (4 * ring[v.index()].0 + ring[v.index()].1 % 4) as u32;
+        let positions: Vec<Point3<f64>> =
+            (0..44).map(|i| Point3::new((i / 4) as f64, corner(i)[0], corner(i)[1])).collect();
+        let triangles: Vec<[u32; 3]> = sheet.patch.mesh.triangles().iter().map(|t| t.map(name)).collect();
+        let tube = test_surfaces::mesh(&positions, &triangles);
+        let polygon: Vec<u32> = (0..tube.face_count() as u32).collect();
+        let on_cut = |v: VertexId| tube.position(v).y == 0.0 && tube.position(v).z == 0.0;
+        let patch =
+            Patch::cut_out(&tube, &polygon, tube.faces().collect(), |h| on_cut(tube.from(h)) && on_cut(tube.to(h)));
+        let mut uv = vec![Point2::origin(); patch.mesh.vertex_count()];
+        for (new, old) in patch.mesh.triangles().iter().flatten().zip(sheet.patch.mesh.triangles().iter().flatten()) {
+            uv[new.index()] = sheet.uv[old.index()];
+        }
+        let open = Chart { patch, uv, l2: 1.0 };
+        assert!((self_border(&open) - 20.0 / 24.0).abs() < 1e-9);
+        assert_eq!((cut_up(vec![sheet]).len(), cut_on(&tube, &polygon, vec![open]).len()), (1, 2));
     }
 
     #[test]

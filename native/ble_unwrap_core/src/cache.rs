@@ -1,12 +1,11 @@
-//! What was computed before for the same input, for an [`Analysis`](super::Analysis) that is unwrapped again.
+//! What was computed before for the same input, for an [`Analysis`](crate::Analysis) that is unwrapped again.
 //!
 //! A result is found by what it is a function of: its kind and a fingerprint of all that enters. So nothing that is kept
 //! can be wrong for a later call, whatever its settings, and it does not matter which call kept it or whether another has
-//! thrown it away: results are the same bit for bit with a memo and without.
+//! thrown it away: results are the same bit for bit with a cache and without.
 
 use std::any::Any;
 use std::collections::HashMap;
-use std::ops::Deref;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use nalgebra::Point2;
@@ -15,14 +14,14 @@ use crate::geodesics::LandmarkDistances;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 
-/// Memory of a memo: as much as one unwrap takes beside it at its peak, per face of the mesh, and
+/// Memory of a cache: as much as one unwrap takes beside it at its peak, per face of the mesh, and
 const BYTES_A_FACE: usize = 1024;
 /// no less than this, for small meshes.
 const LEAST_BYTES: usize = 64 << 20;
 
 /// Kinds of results; each is of one type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     /// The charts of a component.
     Charts,
     /// A coarse mesh.
@@ -49,15 +48,15 @@ pub(super) enum Kind {
 
 /// A fingerprint of 128 bits: that two different inputs among n have the same one has a chance of n²·2⁻¹²⁸.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Fingerprint([u64; 2]);
+pub(crate) struct Fingerprint([u64; 2]);
 
 impl Fingerprint {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self([0x243f_6a88_85a3_08d3, 0x1319_8a2e_0370_7344])
     }
 
     /// Takes one more word in.
-    pub(super) fn word(&mut self, word: u64) {
+    pub(crate) fn word(&mut self, word: u64) {
         let fold = |x: u64, y: u64| {
             let product = u128::from(x) * u128::from(y);
             #[expect(clippy::cast_possible_truncation, reason = "both halves are used")]
@@ -69,7 +68,7 @@ impl Fingerprint {
         self.0 = [fold(a ^ word, 0x9e37_79b9_7f4a_7c15) ^ b, fold(b.rotate_left(23) ^ word, 0xc2b2_ae3d_27d4_eb4f)];
     }
 
-    pub(super) fn reals(&mut self, values: impl IntoIterator<Item = f64>) {
+    pub(crate) fn reals(&mut self, values: impl IntoIterator<Item = f64>) {
         let mut count = 0;
         for value in values {
             self.word(value.to_bits());
@@ -78,11 +77,11 @@ impl Fingerprint {
         self.word(count);
     }
 
-    pub(super) fn points(&mut self, points: &[Point2<f64>]) {
+    pub(crate) fn points(&mut self, points: &[Point2<f64>]) {
         self.reals(points.iter().flat_map(|p| [p.x, p.y]));
     }
 
-    pub(super) fn indices(&mut self, values: impl IntoIterator<Item = usize>) {
+    pub(crate) fn indices(&mut self, values: impl IntoIterator<Item = usize>) {
         let mut count = 0;
         for value in values {
             self.word(value as u64);
@@ -91,11 +90,11 @@ impl Fingerprint {
         self.word(count);
     }
 
-    pub(super) fn numbers(&mut self, values: &[u32]) {
+    pub(crate) fn numbers(&mut self, values: &[u32]) {
         self.indices(values.iter().map(|&v| v as usize));
     }
 
-    pub(super) fn distances(&mut self, distances: &LandmarkDistances) {
+    pub(crate) fn distances(&mut self, distances: &LandmarkDistances) {
         self.indices(distances.landmarks().iter().map(|v| v.index()));
         for l in 0..distances.len() {
             self.indices(distances.row(l).iter().map(|d| d.to_bits() as usize));
@@ -103,14 +102,14 @@ impl Fingerprint {
     }
 
     /// Positions, triangles, how they are glued, and guides.
-    pub(super) fn mesh(&mut self, mesh: &TriMesh) {
+    pub(crate) fn mesh(&mut self, mesh: &TriMesh) {
         self.reals(mesh.positions().iter().flat_map(|p| [p.x, p.y, p.z]));
         self.indices(mesh.triangles().iter().flatten().map(|v| v.index()));
         self.indices(mesh.halfedges().map(|h| 2 * mesh.twin(h).index() + usize::from(mesh.is_guide(h))));
     }
 
     /// Settings, by all that they print.
-    pub(super) fn settings(&mut self, settings: &impl std::fmt::Debug) {
+    pub(crate) fn settings(&mut self, settings: &impl std::fmt::Debug) {
         // Floats print with all the digits that tell them apart.
         let text = format!("{settings:?}");
         self.indices(text.bytes().map(usize::from));
@@ -118,7 +117,7 @@ impl Fingerprint {
 }
 
 /// About the memory that a mesh takes.
-pub(super) fn bytes_of(mesh: &TriMesh) -> usize {
+pub(crate) fn bytes_of(mesh: &TriMesh) -> usize {
     28 * mesh.vertex_count() + 24 * mesh.face_count()
 }
 
@@ -137,21 +136,21 @@ struct Kept {
 }
 
 /// Results of earlier calls, up to a number of bytes; for any number of threads.
-pub(super) struct Memo {
+pub(crate) struct Cache {
     most_bytes: usize,
     kept: Mutex<Kept>,
 }
 
-impl std::fmt::Debug for Memo {
+impl std::fmt::Debug for Cache {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let kept = self.lock();
-        f.debug_struct("Memo").field("entries", &kept.entries.len()).field("bytes", &kept.bytes).finish()
+        f.debug_struct("Cache").field("entries", &kept.entries.len()).field("bytes", &kept.bytes).finish()
     }
 }
 
-impl Memo {
+impl Cache {
     /// For a mesh of so many faces.
-    pub(super) fn new(faces: usize) -> Self {
+    pub(crate) fn new(faces: usize) -> Self {
         Self::with_room(faces.saturating_mul(BYTES_A_FACE).max(LEAST_BYTES))
     }
 
@@ -165,7 +164,7 @@ impl Memo {
     }
 
     /// Another unwrap begins.
-    pub(super) fn begin(&self) {
+    pub(crate) fn begin(&self) {
         self.lock().call += 1;
     }
 
@@ -198,27 +197,19 @@ impl Memo {
 
 /// One unwrap under way: its progress, and what earlier ones of the same mesh have left.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Run<'a> {
-    progress: &'a Progress,
-    memo: Option<&'a Memo>,
-}
-
-impl Deref for Run<'_> {
-    type Target = Progress;
-
-    fn deref(&self) -> &Progress {
-        self.progress
-    }
+pub(crate) struct Run<'a> {
+    pub(crate) progress: &'a Progress,
+    cache: Option<&'a Cache>,
 }
 
 impl<'a> Run<'a> {
-    pub(super) fn new(progress: &'a Progress, memo: Option<&'a Memo>) -> Self {
-        Self { progress, memo }
+    pub(crate) fn new(progress: &'a Progress, cache: Option<&'a Cache>) -> Self {
+        Self { progress, cache }
     }
 
     /// The result of `compute`, or what it was when all that `input` takes in was the same. `bytes` is about what the
     /// result holds. Errors are not kept.
-    pub(super) fn recall<T: Send + Sync + 'static, E>(
+    pub(crate) fn recall<T: Send + Sync + 'static, E>(
         &self,
         kind: Kind,
         input: impl FnOnce(&mut Fingerprint),
@@ -230,7 +221,7 @@ impl<'a> Run<'a> {
 
     /// The same where not every result that is kept will do: one that `will_do` refuses is computed afresh, and the new
     /// one kept.
-    pub(super) fn recall_if<T: Send + Sync + 'static, E>(
+    pub(crate) fn recall_if<T: Send + Sync + 'static, E>(
         &self,
         kind: Kind,
         input: impl FnOnce(&mut Fingerprint),
@@ -238,17 +229,17 @@ impl<'a> Run<'a> {
         bytes: impl FnOnce(&T) -> usize,
         compute: impl FnOnce() -> Result<T, E>,
     ) -> Result<Arc<T>, E> {
-        let Some(memo) = self.memo else { return compute().map(Arc::new) };
+        let Some(cache) = self.cache else { return compute().map(Arc::new) };
         let mut fingerprint = Fingerprint::new();
         input(&mut fingerprint);
         let key = (kind, fingerprint);
-        if let Some(Ok(value)) = memo.get(key).map(Arc::downcast::<T>)
+        if let Some(Ok(value)) = cache.get(key).map(Arc::downcast::<T>)
             && will_do(&value)
         {
             return Ok(value);
         }
         let value = Arc::new(compute()?);
-        memo.put(key, Arc::clone(&value) as Arc<dyn Any + Send + Sync>, bytes(&value));
+        cache.put(key, Arc::clone(&value) as Arc<dyn Any + Send + Sync>, bytes(&value));
         Ok(value)
     }
 }
@@ -273,8 +264,8 @@ mod tests {
 
     #[test]
     fn a_result_is_computed_once() {
-        let (progress, memo) = (Progress::new(), Memo::new(0));
-        let run = Run::new(&progress, Some(&memo));
+        let (progress, cache) = (Progress::new(), Cache::new(0));
+        let run = Run::new(&progress, Some(&cache));
         assert_eq!(recall(&run, Kind::Coarse, 1, 8), (10, true));
         assert_eq!(recall(&run, Kind::Coarse, 1, 8), (10, false));
         assert_eq!(recall(&run, Kind::Coarse, 2, 8), (20, true));
@@ -285,8 +276,8 @@ mod tests {
 
     #[test]
     fn errors_are_not_kept_and_what_will_not_do_is_replaced() {
-        let (progress, memo) = (Progress::new(), Memo::new(0));
-        let run = Run::new(&progress, Some(&memo));
+        let (progress, cache) = (Progress::new(), Cache::new(0));
+        let run = Run::new(&progress, Some(&cache));
         let ask = |least: u32, give: Result<u32, ()>| {
             run.recall_if(Kind::Minimum, |f| f.word(7), |v| *v >= least, |_| 4, || give).map(|v| *v)
         };
@@ -299,21 +290,21 @@ mod tests {
 
     #[test]
     fn memory_is_bounded_and_the_last_calls_come_first() {
-        let (progress, memo) = (Progress::new(), Memo::with_room(100));
-        let run = Run::new(&progress, Some(&memo));
+        let (progress, cache) = (Progress::new(), Cache::with_room(100));
+        let run = Run::new(&progress, Some(&cache));
         for call in 0..5 {
-            memo.begin();
+            cache.begin();
             for i in 0..3 {
                 recall(&run, Kind::Coarse, 10 * call + i, 20);
-                assert!(memo.lock().bytes <= 100);
+                assert!(cache.lock().bytes <= 100);
             }
         }
         assert_eq!(recall(&run, Kind::Coarse, 42, 20), (420, false), "of the last call");
         assert_eq!(recall(&run, Kind::Coarse, 2, 20), (20, true), "long ago");
         assert_eq!(recall(&run, Kind::Coarse, 99, 101), (990, true));
         assert_eq!(recall(&run, Kind::Coarse, 99, 101), (990, true), "larger than all room");
-        let sum: usize = memo.lock().entries.values().map(|e| e.bytes).sum();
-        assert_eq!(sum, memo.lock().bytes);
+        let sum: usize = cache.lock().entries.values().map(|e| e.bytes).sum();
+        assert_eq!(sum, cache.lock().bytes);
     }
 
     #[test]

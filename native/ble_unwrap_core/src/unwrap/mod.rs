@@ -1,32 +1,16 @@
 //! The whole way from a mesh to an atlas; alone knows every stage.
 //!
 //! 1. Condition the input into an oriented manifold surface ([`condition`](crate::mesh::condition())).
-//! 2. Cut it into charts under the stretch limit, and join charts that were cut needlessly.
-//! 3. Pack the charts and round to single precision.
-//! 4. Verify the rounded result exactly and measure it.
+//! 2. Cut it into charts under the stretch limit, with as few and as short seams as can be found ([`cutting`](crate::cutting)).
+//! 3. Lay the charts out: pack them, round to single precision, verify the rounded result exactly, mend what the check finds,
+//!    and measure ([`layout`](crate::layout)).
 
 mod analysis;
-mod budget;
-mod carry;
-mod charting;
-mod component;
-mod darts;
-mod finish;
-mod flatten;
-mod memo;
-mod merge;
 mod needs;
-mod polygon;
-mod prolong;
-mod recut;
-mod relief;
-mod ribbons;
-mod rigid;
-mod sew;
-mod tally;
-mod touch_up;
+mod prepared;
 
 use crate::atlas::Atlas;
+use crate::cache::Run;
 use crate::clock::Clock;
 use crate::error::UnwrapError;
 use crate::mesh::MeshInput;
@@ -34,8 +18,7 @@ use crate::progress::{Progress, Stage};
 use crate::settings::Settings;
 
 pub use analysis::Analysis;
-use analysis::Prepared;
-use memo::Run;
+use prepared::Prepared;
 
 /// Unwraps a mesh: cuts it into charts, flattens them under the stretch limit, and packs them into the unit square.
 ///

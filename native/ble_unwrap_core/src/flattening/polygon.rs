@@ -4,26 +4,26 @@ use std::f64::consts::TAU;
 
 use nalgebra::Point2;
 
+use crate::cache::Run;
 use crate::charts::Patch;
 use crate::distortion::RestTriangle;
 use crate::geodesics::LandmarkDistances;
 use crate::progress::Cancelled;
 use crate::settings::Settings;
 
-use super::flatten::{self, Flat, Flattened, l2};
-use super::memo::Run;
-use crate::flattening::{Rung, Rungs};
+use super::ladder::{self, Flat, Flattened, l2};
+use super::rungs::{Rung, Rungs};
 
 /// Flattens a patch that is one polygon, which cannot be split: as well as it goes, and at worst on a
 /// circle, where every triangulation of a polygon is free of flips.
-pub(super) fn flatten(
+pub(crate) fn flatten_polygon(
     patch: &Patch,
     distances: &LandmarkDistances,
     settings: &Settings,
     rungs: &mut Rungs,
-    progress: &Run<'_>,
+    run: &Run<'_>,
 ) -> Result<Flat, Cancelled> {
-    if let Flattened::Flat(flat) = flatten::without_limit(patch, distances, settings, rungs, progress)? {
+    if let Flattened::Flat(flat) = ladder::without_limit(patch, distances, settings, rungs, run)? {
         return Ok(flat);
     }
     rungs.take(Rung::TutteCircle);
@@ -33,7 +33,7 @@ pub(super) fn flatten(
 /// A patch that is one polygon, too thin or too small for single precision: a triangle at least a
 /// thousandth as high as long, and if that was not enough or for more corners a regular polygon.
 /// Whatever the polygon, no triangle of it is close to degenerate.
-pub(super) fn thicken(patch: &Patch, was_not_enough: bool) -> Flat {
+pub(crate) fn thicken(patch: &Patch, was_not_enough: bool) -> Flat {
     if patch.mesh.face_count() > 1 || was_not_enough {
         return on_a_circle(patch);
     }

@@ -9,13 +9,12 @@ use std::sync::Arc;
 
 use nalgebra::Point2;
 
+use crate::cache::{Kind, Run};
 use crate::charts::{self, Patch};
 use crate::distortion::RestTriangle;
 use crate::mesh::{HalfedgeId, VertexId};
 use crate::progress::Cancelled;
 use crate::stretch::{self, Bulge, StretchError};
-
-use super::memo::{Kind, Run};
 
 /// A patch is promising if its conformal map has at most so many times the stretch above 1 that the limit allows; the map of
 /// least stretch has far less, as it need not keep angles. Over 16 models in several triangulations 3, 4.5, 6 and 9 give 3.39,
@@ -23,23 +22,21 @@ use super::memo::{Kind, Run};
 const PROMISING: f64 = 6.0;
 /// A patch that needs more darts is split. Over the same models 4, 6 and 9 give the same charts.
 const MOST_DARTS: usize = 6;
-/// A patch with more corners has no net: a box has eight.
-const MOST_CORNERS: usize = 8;
 /// A patch with more doubled edges is left as it is, and split.
 const MOST_DOUBLED: usize = 8;
 
 /// A patch, how it bulges, and how much it may.
 #[derive(Clone)]
-pub(super) struct Relief<'a> {
+pub(crate) struct Bulging<'a> {
     patch: Cow<'a, Patch>,
     bulge: Arc<Bulge>,
     most: f64,
     run: &'a Run<'a>,
 }
 
-impl<'a> Relief<'a> {
+impl<'a> Bulging<'a> {
     /// `None` where that cannot be told.
-    pub(super) fn of(patch: Cow<'a, Patch>, stretch_limit: f64, run: &'a Run<'a>) -> Result<Option<Self>, Cancelled> {
+    pub(crate) fn of(patch: Cow<'a, Patch>, stretch_limit: f64, run: &'a Run<'a>) -> Result<Option<Self>, Cancelled> {
         Self::new(patch, 1.0 + PROMISING * (stretch_limit - 1.0), run)
     }
 
@@ -59,30 +56,30 @@ impl<'a> Relief<'a> {
     }
 
     /// Whether the patch may come under the limit as it is.
-    pub(super) fn is_promising(&self) -> bool {
+    pub(crate) fn is_promising(&self) -> bool {
         self.bulge.root.is_none() && self.bulge.enclosed.is_none() && self.bulge.l2 <= self.most
     }
 
     /// The patch with as many darts as make it promising; `None` where that takes none, too many, or nothing bulges. Also where
     /// guides run inside it: they say where it is to be cut, and a split goes there.
-    pub(super) fn relieved(self) -> Result<Option<Patch>, Cancelled> {
+    pub(crate) fn with_enough_darts(self) -> Result<Option<Patch>, Cancelled> {
         if is_guided(&self.patch) || self.is_promising() {
             return Ok(None);
         }
-        let mut relief = self;
+        let mut bulging = self;
         for _ in 0..MOST_DARTS {
-            let Some(open) = relief.with_dart() else { return Ok(None) };
-            let Some(next) = Self::new(Cow::Owned(open), relief.most, relief.run)? else { return Ok(None) };
-            relief = next;
-            if relief.is_promising() {
-                return Ok(Some(relief.patch.into_owned()));
+            let Some(open) = bulging.with_dart() else { return Ok(None) };
+            let Some(next) = Self::new(Cow::Owned(open), bulging.most, bulging.run)? else { return Ok(None) };
+            bulging = next;
+            if bulging.is_promising() {
+                return Ok(Some(bulging.patch.into_owned()));
             }
         }
         Ok(None)
     }
 
     /// The patch with one dart, and where its vertices are if they stay where they were.
-    pub(super) fn opened(&self, uv: &[Point2<f64>]) -> Option<(Patch, Vec<Point2<f64>>)> {
+    pub(crate) fn opened(&self, uv: &[Point2<f64>]) -> Option<(Patch, Vec<Point2<f64>>)> {
         let open = self.with_dart()?;
         let start = carried(uv, &self.patch, &open);
         Some((open, start))
@@ -94,29 +91,8 @@ impl<'a> Relief<'a> {
     }
 }
 
-/// A patch that is flat but for a few corners, cut to all of these: a net, which unfolds without stretch. `None` where it
-/// has none, too many, or curvature elsewhere, and where guides run inside it.
-pub(super) fn net(patch: &Patch) -> Option<Patch> {
-    let mut net = Cow::Borrowed(patch);
-    let is_closed = patch.mesh.halfedges().all(|h| !patch.mesh.is_boundary(h));
-    for cuts in 0..=MOST_CORNERS {
-        let corners = stretch::corners(&net.mesh, MOST_CORNERS)?;
-        if cuts == 0 && (corners.is_empty() || is_guided(patch)) {
-            return None;
-        }
-        // The first cut of a closed surface ends at its sharpest corner.
-        let root = if cuts == 0 && is_closed { corners.first().copied() } else { None };
-        let mut tips = corners.into_iter().filter(|v| Some(*v) != root).peekable();
-        if tips.peek().is_none() {
-            return if let Cow::Owned(net) = net { Some(net) } else { None };
-        }
-        net = Cow::Owned(tips.find_map(|tip| cut_to(&net, tip, root))?);
-    }
-    None
-}
-
 /// A patch, and where its vertices lie in the plane, opened where two edges join the same vertices, as no straight lines can.
-pub(super) fn without_doubled_edges(patch: Patch, uv: Vec<Point2<f64>>) -> (Patch, Vec<Point2<f64>>) {
+pub(crate) fn without_doubled_edges(patch: Patch, uv: Vec<Point2<f64>>) -> (Patch, Vec<Point2<f64>>) {
     let (mut patch, mut uv) = (patch, uv);
     for _ in 0..MOST_DOUBLED {
         let Some(open) = stretch::enclosed_vertex(&patch.mesh).and_then(|tip| cut_to(&patch, tip, None)) else { break };
@@ -136,13 +112,13 @@ fn carried(uv: &[Point2<f64>], before: &Patch, after: &Patch) -> Vec<Point2<f64>
     carried
 }
 
-fn is_guided(patch: &Patch) -> bool {
+pub(super) fn is_guided(patch: &Patch) -> bool {
     let mesh = &patch.mesh;
     mesh.has_guides() && mesh.edges().any(|h| mesh.is_guide(h) && !mesh.is_boundary(h))
 }
 
 /// A patch cut from an inner vertex to the boundary, or on a closed surface to its root.
-fn cut_to(patch: &Patch, tip: VertexId, root: Option<VertexId>) -> Option<Patch> {
+pub(super) fn cut_to(patch: &Patch, tip: VertexId, root: Option<VertexId>) -> Option<Patch> {
     let mesh = &patch.mesh;
     let length = |h: HalfedgeId| mesh.edge_length(h) * mesh.border_cost(h);
     let dart = charts::shortest_path_to_boundary(mesh, tip, root, length, |h| patch.is_diagonal(h))?;
@@ -170,18 +146,18 @@ mod tests {
         test_surfaces::mesh(&positions, &triangles)
     }
 
-    fn of<T>(patch: &Patch, stretch_limit: f64, then: impl FnOnce(Relief<'_>) -> T) -> T {
+    fn of<T>(patch: &Patch, stretch_limit: f64, then: impl FnOnce(Bulging<'_>) -> T) -> T {
         let progress = Progress::new();
         let run = Run::new(&progress, None);
-        then(Relief::of(Cow::Borrowed(patch), stretch_limit, &run).expect("memory").expect("factored"))
+        then(Bulging::of(Cow::Borrowed(patch), stretch_limit, &run).expect("memory").expect("factored"))
     }
 
     #[test]
     fn a_cone_gets_one_dart_from_its_tip() {
         let sheet = test_surfaces::grid(12, 12, [2.0, 2.0], 0.0);
         let cone = whole(moved(&sheet, |p| Point3::new(p.x, p.y, -2.0 * (p.x - 1.0).hypot(p.y - 1.0))));
-        assert!(!of(&cone, 1.02, |relief| relief.is_promising()));
-        let open = of(&cone, 1.02, |relief| relief.relieved().expect("memory")).expect("one dart does");
+        assert!(!of(&cone, 1.02, |bulging| bulging.is_promising()));
+        let open = of(&cone, 1.02, |bulging| bulging.with_enough_darts().expect("memory")).expect("one dart does");
         assert!(open.mesh.topology().is_disk());
         let seam = 0.5 * (open.mesh.boundary_length() - cone.mesh.boundary_length());
         let side = 5.0_f64.sqrt();
@@ -194,34 +170,17 @@ mod tests {
     #[test]
     fn a_closed_body_is_cut_open_and_a_sheet_left_alone() {
         let long = whole(moved(&test_surfaces::sphere(3), |p| Point3::new(0.2 * p.x, 0.2 * p.y, p.z)));
-        let open = of(&long, 1.1, |relief| relief.relieved().expect("memory"))
+        let open = of(&long, 1.1, |bulging| bulging.with_enough_darts().expect("memory"))
             .expect("a spindle is rolled out by a cut from end to end");
         assert!(open.mesh.topology().is_disk());
         assert!((measure::total_area(&open.mesh) - long.area()).abs() < 1e-12);
         let sheet = whole(test_surfaces::grid(12, 12, [2.0, 2.0], 0.0));
-        assert!(of(&sheet, 1.1, |flat| flat.is_promising() && flat.relieved().expect("memory").is_none()));
+        assert!(of(&sheet, 1.1, |flat| flat.is_promising() && flat.with_enough_darts().expect("memory").is_none()));
         let ball = whole(test_surfaces::sphere(3));
         assert!(
-            of(&ball, 1.001, |relief| relief.relieved().expect("memory")).is_none(),
+            of(&ball, 1.001, |bulging| bulging.with_enough_darts().expect("memory")).is_none(),
             "no six darts do for that limit"
         );
-    }
-
-    #[test]
-    fn a_box_has_a_net_whole_or_open_and_a_ball_has_none() {
-        let cube = test_surfaces::cubes([1, 1, 1], |_| true);
-        let box_of = |mesh| whole(moved(mesh, |p| Point3::new(p.x, 2.0 * p.y, 3.0 * p.z)));
-        let closed = box_of(&cube);
-        let unfolded = net(&closed).expect("a net");
-        assert!(unfolded.mesh.topology().is_disk());
-        assert_eq!(stretch::corners(&unfolded.mesh, 0), Some(Vec::new()), "no corner is left inside");
-        let ball = whole(test_surfaces::sphere(3));
-        assert!(net(&ball).is_none());
-        let sheet = whole(test_surfaces::grid(4, 4, [1.0, 1.0], 0.0));
-        assert!(net(&sheet).is_none(), "nothing to cut");
-        let marks = closed.mesh.halfedges().map(|h| [h, closed.mesh.twin(h)].contains(&HalfedgeId::new(0))).collect();
-        let guided = whole(TriMesh::clone(&closed.mesh).with_guides(marks));
-        assert!(net(&guided).is_none(), "the user says where it is to be cut");
     }
 
     #[test]
@@ -238,8 +197,8 @@ mod tests {
     fn a_flat_patch_with_a_doubled_edge_is_opened_there() {
         let sheet = test_surfaces::sheet_with_a_flap();
         let patch = whole(sheet);
-        assert!(!of(&patch, 1.1, |relief| relief.is_promising()), "two of its edges join the same vertices");
-        let open = of(&patch, 1.1, |relief| relief.relieved().expect("memory")).expect("one dart does");
+        assert!(!of(&patch, 1.1, |bulging| bulging.is_promising()), "two of its edges join the same vertices");
+        let open = of(&patch, 1.1, |bulging| bulging.with_enough_darts().expect("memory")).expect("one dart does");
         assert_eq!(stretch::enclosed_vertex(&open.mesh), None);
         let uv: Vec<Point2<f64>> = patch.mesh.positions().iter().map(|p| p.xy()).collect();
         let (opened, start) = without_doubled_edges(patch.clone(), uv);

@@ -1,23 +1,14 @@
 //! A mesh prepared for being unwrapped several times.
 
-use std::cmp::Reverse;
-use std::sync::Arc;
-
-use rayon::prelude::*;
-
 use crate::atlas::Atlas;
-use crate::charts::{Chart, Patch};
+use crate::cache::{Cache, Run};
 use crate::clock::Clock;
 use crate::error::UnwrapError;
-use crate::mesh::{self, ConditionOptions, FaceId, Groups, MeshInput, Surface};
-use crate::packing::PackSettings;
-use crate::progress::{Cancelled, Progress, Stage};
-use crate::settings::{ChartScale, LimitOver, Settings};
+use crate::mesh::{ConditionOptions, MeshInput};
+use crate::progress::{Progress, Stage};
+use crate::settings::Settings;
 
-use super::memo::{self, Fingerprint, Kind, Memo, Run};
-use super::tally::Tally;
-use super::{budget, component, finish, needs, ribbons};
-use crate::flattening::Rungs;
+use super::prepared::Prepared;
 
 /// A mesh, and what was found out about it, for unwrapping it several times with different settings.
 ///
@@ -32,7 +23,7 @@ pub struct Analysis {
     face_offsets: Vec<i32>,
     conditioning: ConditionOptions,
     prepared: Prepared,
-    memo: Memo,
+    cache: Cache,
 }
 
 impl Analysis {
@@ -49,7 +40,7 @@ impl Analysis {
         let conditioning = settings.conditioning();
         let prepared = Prepared::new(input, &conditioning, progress)?;
         Ok(Self {
-            memo: Memo::new(prepared.surface.mesh.face_count()),
+            cache: Cache::new(prepared.surface.mesh.face_count()),
             prepared,
             positions: input.positions.to_vec(),
             corner_vertices: input.corner_vertices.to_vec(),
@@ -102,109 +93,8 @@ impl Analysis {
             face_offsets: &self.face_offsets,
             ..MeshInput::default()
         };
-        self.memo.begin();
-        self.prepared.unwrap(&input, settings, Clock::new(), &Run::new(progress, Some(&self.memo)))
-    }
-}
-
-/// The charts of a component, and how they came about.
-type Made = (Vec<Chart>, Rungs);
-
-/// The charts of a component, which is `faces` of the surface, or what they were under the same settings but for those of
-/// later stages.
-fn charts_of(
-    whole: &Patch,
-    faces: &[FaceId],
-    settings: &Settings,
-    tally: &Tally<'_>,
-    progress: &Run<'_>,
-) -> Result<Arc<Made>, Cancelled> {
-    let input = |f: &mut Fingerprint| {
-        f.mesh(&whole.mesh);
-        f.numbers(&whole.polygon);
-        // They are named in the result.
-        f.indices(faces.iter().map(|face| face.index()));
-        f.settings(&Settings {
-            limit_over: LimitOver::Chart,
-            chart_scale: ChartScale::Uniform,
-            packing: PackSettings::default(),
-            ..settings.clone()
-        });
-    };
-    let bytes = |made: &Made| made.0.iter().map(|c| memo::bytes_of(&c.patch.mesh) + 24 * c.uv.len()).sum();
-    progress.recall(Kind::Charts, input, bytes, || component::charts(whole, faces, settings, tally, progress))
-}
-
-/// The surface of a mesh, and its connected pieces.
-#[derive(Debug)]
-pub(super) struct Prepared {
-    surface: Surface,
-    /// The faces of each piece, ascending. The pieces become meshes of their own only while they are charted.
-    components: Groups<FaceId>,
-}
-
-impl Prepared {
-    pub(super) fn new(
-        input: &MeshInput<'_>,
-        conditioning: &ConditionOptions,
-        progress: &Progress,
-    ) -> Result<Self, UnwrapError> {
-        let surface = mesh::condition(input, conditioning, progress)?;
-        let (label, count) = surface.mesh.components();
-        Ok(Self { components: Groups::by_label(&label, count, FaceId::new), surface })
-    }
-
-    /// A component as a mesh of its own, which a connected surface is already.
-    fn whole(&self, faces: &[FaceId]) -> Patch {
-        let Surface { mesh, polygon, .. } = &self.surface;
-        if faces.len() == mesh.face_count() {
-            return Patch::whole(Arc::clone(mesh), polygon.clone());
-        }
-        let (part, _) = mesh.submesh(faces, |_| false);
-        Patch::whole(Arc::new(part), faces.iter().map(|f| polygon[f.index()]).collect())
-    }
-
-    /// The stages after conditioning. Of `input` only positions, corners and offsets are looked at.
-    pub(super) fn unwrap(
-        &self,
-        input: &MeshInput<'_>,
-        settings: &Settings,
-        mut clock: Clock,
-        progress: &Run<'_>,
-    ) -> Result<Atlas, UnwrapError> {
-        needs::require(input, self.components.len(), settings)?;
-        progress.enter(Stage::Charts);
-        let surface = &self.surface;
-        let tally = Tally::new(progress, surface.mesh.face_count());
-        let charted = |component: usize| {
-            let faces = self.components.group(component);
-            (component, charts_of(&self.whole(faces), faces, settings, &tally, progress))
-        };
-        // The largest first, so that no long one starts last.
-        let mut order: Vec<usize> = (0..self.components.len()).collect();
-        order.sort_by_key(|&component| Reverse(self.components.group(component).len()));
-        let mut made: Vec<(usize, Result<Arc<Made>, Cancelled>)> =
-            order.into_par_iter().with_max_len(1).map(charted).collect();
-        made.sort_unstable_by_key(|m| m.0);
-        let (mut charts, mut rungs) = (Vec::new(), Rungs::default());
-        for (_, component) in made {
-            let component = component?;
-            rungs.add(&component.1);
-            match Arc::try_unwrap(component) {
-                Ok((more, _)) => charts.extend(more),
-                Err(kept) => charts.extend_from_slice(&kept.0),
-            }
-        }
-        if settings.limit_over == LimitOver::Atlas && settings.merge {
-            let (joined, steps) = budget::spend(&surface.mesh, &surface.polygon, charts, settings, progress)?;
-            charts = joined;
-            rungs.add(&steps);
-        }
-        if settings.coarse {
-            charts = ribbons::cut(charts, settings, &mut rungs, progress)?;
-        }
-        clock.lap("charts");
-        finish::finish(input, surface, charts, rungs, settings, clock, progress)
+        self.cache.begin();
+        self.prepared.unwrap(&input, settings, Clock::new(), &Run::new(progress, Some(&self.cache)))
     }
 }
 

@@ -5,41 +5,30 @@
 
 use rayon::prelude::*;
 
+use crate::cache::Run;
 use crate::charts::Chart;
-use crate::mesh::{HalfedgeId, TriMesh};
+use crate::flattening::{Rung, Rungs};
+use crate::mesh::TriMesh;
 use crate::progress::Cancelled;
 use crate::settings::Settings;
 
-use super::memo::Run;
-use super::sew::{self, Joined};
-use crate::flattening::{Rung, Rungs};
+use super::moves::Site;
+use super::moves::join::{Join, Which};
+use super::search::tried;
+use super::state::{ChartId, Cutting};
+use super::trial::Verdict;
 
-/// Share of the budget that is left for rounding to single precision.
+/// Share of what the limit allows that is left for rounding to single precision.
 const RESERVE: f64 = 1e-4;
 
 /// Two neighbours and what their union would be.
 struct Union {
-    /// Places in the pool.
-    pair: [usize; 2],
+    pair: [ChartId; 2],
     chart: Chart,
     /// Area times squared stretch that it has more than its parts.
     added: f64,
     /// That over the length of border that it saves.
     price: f64,
-}
-
-/// A chart in the pool, and its share in the sum of area times squared L2 stretch.
-struct Member {
-    chart: Chart,
-    area: f64,
-    stretch: f64,
-}
-
-impl Member {
-    fn new(chart: Chart) -> Self {
-        let area = chart.patch.area();
-        Self { stretch: area * chart.l2 * chart.l2, area, chart }
-    }
 }
 
 /// Joins neighbouring charts of a surface while the area-weighted mean of the squared L2 stretch of the charts stays
@@ -48,123 +37,84 @@ impl Member {
 ///
 /// Every pair of neighbours is flattened together once, and every union that is taken with each of its neighbours: some
 /// ten trials a chart.
-pub(super) fn spend(
+pub(crate) fn join_within_atlas(
     mesh: &TriMesh,
     polygon: &[u32],
     charts: Vec<Chart>,
     settings: &Settings,
-    progress: &Run<'_>,
-) -> Result<(Vec<Chart>, Rungs), Cancelled> {
-    let mut pool = Pool::new(mesh, polygon, charts, settings);
-    let mut rungs = Rungs::default();
-    let mut offers = pool.offers(pool.neighbours(None), progress)?;
+    rungs: &mut Rungs,
+    run: &Run<'_>,
+) -> Result<Vec<Chart>, Cancelled> {
+    let area: f64 = charts.iter().map(|c| c.patch.area()).sum();
+    let spent = charts.iter().map(stretch).sum();
+    let most = (1.0 - RESERVE) * settings.stretch_limit.powi(2) * area;
+    let mut budget = Budget { cutting: Cutting::new(mesh, polygon, charts), settings, most, spent };
+    let mut offers = budget.offers(budget.cutting.neighbours(None), run)?;
     loop {
-        progress.check()?;
-        let left = pool.left();
+        run.progress.check()?;
+        let left = budget.left();
         let price = |i: usize| (offers[i].price, offers[i].pair);
         let payable = (0..offers.len()).filter(|&i| offers[i].added <= left);
         let best = payable.min_by(|&i, &j| price(i).0.total_cmp(&price(j).0).then(price(i).1.cmp(&price(j).1)));
         let Some(best) = best else { break };
         let Union { pair, chart, .. } = offers.swap_remove(best);
         rungs.take(Rung::Merge);
-        let joined = pool.join(pair, chart);
-        offers.retain(|o| o.pair.iter().all(|i| !pair.contains(i)));
-        offers.extend(pool.offers(pool.neighbours(Some(joined)), progress)?);
+        let joined = budget.join(pair, chart);
+        offers.retain(|o| o.pair.iter().all(|id| !pair.contains(id)));
+        for id in joined {
+            offers.extend(budget.offers(budget.cutting.neighbours(Some(id)), run)?);
+        }
     }
-    let mut charts: Vec<Chart> = pool.members.into_iter().flatten().map(|m| m.chart).collect();
-    charts.sort_by_key(|c| c.patch.faces.iter().min().copied());
-    Ok((charts, rungs))
+    Ok(budget.cutting.into_charts())
 }
 
-struct Pool<'a> {
-    mesh: &'a TriMesh,
-    polygon: &'a [u32],
+/// A chart's share in the sum of area times squared L2 stretch.
+fn stretch(chart: &Chart) -> f64 {
+    chart.patch.area() * chart.l2 * chart.l2
+}
+
+struct Budget<'a> {
+    cutting: Cutting<'a>,
     settings: &'a Settings,
-    /// Those that were joined to others are gone.
-    members: Vec<Option<Member>>,
-    /// Place of each face of the surface.
-    owner: Vec<usize>,
     /// What the sum of area times squared stretch may come to.
-    budget: f64,
+    most: f64,
     spent: f64,
 }
 
-impl<'a> Pool<'a> {
-    fn new(mesh: &'a TriMesh, polygon: &'a [u32], charts: Vec<Chart>, settings: &'a Settings) -> Self {
-        let members: Vec<Option<Member>> = charts.into_iter().map(|c| Some(Member::new(c))).collect();
-        let mut owner = vec![usize::MAX; mesh.face_count()];
-        for (i, member) in members.iter().enumerate() {
-            for f in member.iter().flat_map(|m| &m.chart.patch.faces) {
-                owner[f.index()] = i;
-            }
-        }
-        let area: f64 = members.iter().flatten().map(|m| m.area).sum();
-        let spent = members.iter().flatten().map(|m| m.stretch).sum();
-        let budget = (1.0 - RESERVE) * settings.stretch_limit.powi(2) * area;
-        Self { mesh, polygon, settings, members, owner, budget, spent }
-    }
-
+impl Budget<'_> {
     fn left(&self) -> f64 {
-        self.budget - self.spent
-    }
-
-    /// Length of the border between each pair of neighbours, or of one chart and its neighbours, by pair.
-    fn neighbours(&self, of: Option<usize>) -> Vec<([usize; 2], f64)> {
-        let side = |h: HalfedgeId| {
-            let t = self.mesh.twin(h);
-            if t.is_none() {
-                return None;
-            }
-            let (a, b) = (self.owner[h.face().index()], self.owner[t.face().index()]);
-            let wanted = a != b && a != usize::MAX && b != usize::MAX;
-            wanted.then(|| ([a.min(b), a.max(b)], self.mesh.edge_length(h) * self.mesh.border_cost(h)))
-        };
-        let mut sides: Vec<([usize; 2], f64)> = match of.map(|i| &self.members[i]) {
-            None => self.mesh.edges().filter_map(side).collect(),
-            Some(member) => {
-                let faces = member.iter().flat_map(|m| &m.chart.patch.faces);
-                faces.flat_map(|f| f.halfedges()).filter_map(side).collect()
-            }
-        };
-        sides.sort_by_key(|s| s.0);
-        let total = |group: &[([usize; 2], f64)]| (group[0].0, group.iter().map(|s| s.1).sum());
-        sides.chunk_by(|s, t| s.0 == t.0).map(total).collect()
+        self.most - self.spent
     }
 
     /// The unions of pairs of neighbours that flatten within what is left.
-    fn offers(&self, pairs: Vec<([usize; 2], f64)>, progress: &Run<'_>) -> Result<Vec<Union>, Cancelled> {
-        let offer = |(pair, saved): ([usize; 2], f64)| {
-            progress.check()?;
-            let [Some(a), Some(b)] = pair.map(|i| self.members[i].as_ref()) else { return Ok(None) };
-            let most = ((self.left() + a.stretch + b.stretch) / (a.area + b.area)).sqrt();
+    fn offers(&self, pairs: Vec<([ChartId; 2], f64)>, run: &Run<'_>) -> Result<Vec<Union>, Cancelled> {
+        let offer = |(pair, saved): ([ChartId; 2], f64)| {
+            run.progress.check()?;
+            let [Some(a), Some(b)] = pair.map(|id| self.cutting.chart(id)) else { return Ok(None) };
+            let (area, before) = (a.patch.area() + b.patch.area(), [stretch(a), stretch(b)]);
             let mut settings = self.settings.clone();
-            settings.stretch_limit = most.min(self.settings.chart_limit());
+            settings.stretch_limit = ((self.left() + before[0] + before[1]) / area).sqrt().min(settings.chart_limit());
             if settings.stretch_limit.is_nan() || settings.stretch_limit <= 1.0 {
                 return Ok(None);
             }
-            let sides = [&a.chart, &b.chart];
-            let union = sew::joined(self.mesh, self.polygon, sides, &settings, &mut Rungs::default(), progress)?;
-            let Joined::Chart(chart) = union else { return Ok(None) };
-            let added = (a.area + b.area) * chart.l2 * chart.l2 - a.stretch - b.stretch;
-            Ok(Some(Union { pair, chart: *chart, added, price: added / saved.max(f64::MIN_POSITIVE) }))
+            let site = Site { charts: pair, ways: Vec::new() };
+            let (verdict, _) = tried(&self.cutting, &Join { which: Which::All }, &site, &settings, run)?;
+            let Verdict::Charts(charts) = verdict else { return Ok(None) };
+            let Ok([chart]) = <[Chart; 1]>::try_from(charts) else { return Ok(None) };
+            let added = area * chart.l2 * chart.l2 - before[0] - before[1];
+            Ok(Some(Union { pair, chart, added, price: added / saved.max(f64::MIN_POSITIVE) }))
         };
         let offers: Vec<Result<Option<Union>, Cancelled>> = pairs.into_par_iter().with_max_len(1).map(offer).collect();
         offers.into_iter().filter_map(Result::transpose).collect()
     }
 
-    /// Takes a union in place of its parts; returns its place.
-    fn join(&mut self, pair: [usize; 2], chart: Chart) -> usize {
-        let place = self.members.len();
-        for f in &chart.patch.faces {
-            self.owner[f.index()] = place;
+    /// Takes a union in place of its parts; returns its name.
+    fn join(&mut self, pair: [ChartId; 2], chart: Chart) -> Vec<ChartId> {
+        for part in pair.iter().filter_map(|&id| self.cutting.chart(id)) {
+            self.spent -= stretch(part);
         }
-        for i in pair {
-            self.spent -= self.members[i].take().map_or(0.0, |m| m.stretch);
-        }
-        let member = Member::new(chart);
-        self.spent += member.stretch;
-        self.members.push(Some(member));
-        place
+        self.spent += stretch(&chart);
+        self.cutting.replace(&pair, vec![chart])
     }
 }
 
@@ -177,7 +127,7 @@ mod tests {
     use crate::settings::LimitOver;
     use nalgebra::Point3;
 
-    use super::super::charting;
+    use super::super::attempt;
 
     /// Quarters of a cap of a ball, each flattened by itself.
     fn quarters() -> (TriMesh, Vec<u32>, Vec<Chart>) {
@@ -196,7 +146,7 @@ mod tests {
             let faces = mesh.faces().filter(|&f| quarter(f) == place).collect();
             let patch = Patch::of_surface(&mesh, &polygon, faces);
             let run = Run::new(&progress, None);
-            charting::as_one(&patch, &Settings::default(), &mut Rungs::default(), &run).expect("runs").expect("flat")
+            attempt::as_one(&patch, &Settings::default(), &mut Rungs::default(), &run).expect("runs").expect("flat")
         };
         let charts = [(0, 0), (0, 1), (1, 0), (1, 1)].map(flat).to_vec();
         (mesh, polygon, charts)
@@ -207,7 +157,9 @@ mod tests {
         let settings = Settings { stretch_limit: limit, limit_over: LimitOver::Atlas, ..Settings::default() };
         let progress = Progress::new();
         let run = Run::new(&progress, None);
-        let (joined, rungs) = spend(&mesh, &polygon, charts.clone(), &settings, &run).expect("not cancelled");
+        let mut rungs = Rungs::default();
+        let joined =
+            join_within_atlas(&mesh, &polygon, charts.clone(), &settings, &mut rungs, &run).expect("not cancelled");
         let merges: usize = rungs.taken().iter().filter(|r| r.0 == "merge").map(|r| r.1).sum();
         assert_eq!(merges, charts.len() - joined.len());
         let mut faces: Vec<FaceId> = joined.iter().flat_map(|c| c.patch.faces.iter().copied()).collect();

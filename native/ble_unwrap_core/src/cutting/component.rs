@@ -1,0 +1,59 @@
+//! One connected surface to charts, by way of a coarse mesh where it is large.
+
+use crate::cache::Run;
+use crate::charts::{Chart, Patch};
+use crate::flattening::Rungs;
+use crate::mesh::FaceId;
+use crate::progress::Cancelled;
+use crate::settings::Settings;
+
+use super::charted::Charted;
+use super::level::OnCoarse;
+use super::moves::hand_over::hand_over;
+use super::moves::join::Which;
+use super::moves::split;
+use super::whole::Whole;
+
+/// Components of more vertices are charted on a coarse mesh.
+const COARSE_ABOVE: usize = 3_000;
+/// On the fine mesh only charts that a split there has made are joined again, and only up to so many faces: the
+/// others have been tried on the coarse mesh.
+const FINE_UNION: usize = 20_000;
+/// Share of the area that unrolls of a component that is charted as it is, however large. A little is left to rounding.
+const ALL: f64 = 1.0 - 1e-6;
+/// Share of the work on a component that the coarse mesh takes.
+const COARSE_WORK: f64 = 0.4;
+
+/// The charts of one component of the surface, by lowest face. `whole` is the component as a patch of itself; its faces are
+/// named as in `faces`.
+pub(crate) fn charts(
+    whole: &Patch,
+    faces: &[FaceId],
+    settings: &Settings,
+    charted: &Charted<'_>,
+    run: &Run<'_>,
+) -> Result<(Vec<Chart>, Rungs), Cancelled> {
+    let fine = Whole { patch: whole };
+    let size = faces.len() as f64;
+    let mut rungs = Rungs::default();
+    let is_large = whole.mesh.vertex_count() > COARSE_ABOVE && settings.coarse;
+    // What unrolls needs no trials that a coarse mesh would make cheap, and has its edges on the fine one.
+    let unrolling = is_large.then(|| split::hard_parts(whole, ALL, settings)).flatten();
+    let mut charts = if is_large && unrolling.is_none() {
+        let coarse = OnCoarse::new(fine, settings, run)?;
+        let parts = coarse.parts(&mut rungs, run)?;
+        charted.add(size, COARSE_WORK);
+        let done = |faces| charted.add(faces, 1.0 - COARSE_WORK);
+        let charting = coarse.polish(parts, &done, &mut rungs, run)?;
+        fine.join(charting, Which::AfterSplits { most_faces: FINE_UNION }, settings, &mut rungs, run)?
+    } else {
+        let patches = unrolling.unwrap_or_else(|| vec![whole.clone()]);
+        let charts = fine.charts(patches, settings, &mut rungs, &|faces| charted.add(faces, 1.0), run)?;
+        fine.join_partly(charts, settings, &mut rungs, run)?
+    };
+    charts = hand_over(&whole.mesh, &whole.polygon, charts, settings, &mut rungs, run)?;
+    for f in charts.iter_mut().flat_map(|c| &mut c.patch.faces) {
+        *f = faces[f.index()];
+    }
+    Ok((charts, rungs))
+}

@@ -1,0 +1,121 @@
+//! Where a surface is cut into charts.
+//!
+//! The state is a [cutting](state): which chart has which face, and so which edges are seams. Every [move](moves) proposes an
+//! [edit](edit): edges to open, edges to glue. A [trial](trial()) flattens what an edit changes, and the [search](search())
+//! makes the edits that come to something. Charts come from patches that are [divided](divide()) until each can be
+//! flattened; on a large component this happens on a [coarse mesh](level) first.
+
+mod atlas_limit;
+mod attempt;
+mod border;
+mod charted;
+mod component;
+mod divide;
+mod edit;
+mod history;
+mod level;
+mod measured;
+mod moves;
+mod rigid_motion;
+mod search;
+mod state;
+mod trial;
+mod whole;
+
+use std::cmp::Reverse;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::cache::{self, Fingerprint, Kind, Run};
+use crate::charts::{Chart, Patch};
+use crate::flattening::Rungs;
+use crate::mesh::{FaceId, Groups, Surface};
+use crate::packing::PackSettings;
+use crate::progress::Cancelled;
+use crate::settings::{ChartScale, LimitOver, Settings};
+
+use atlas_limit::join_within_atlas;
+use charted::Charted;
+use moves::across::cut_across;
+
+pub(crate) use divide::divide;
+
+/// The charts of a component, and how they came about.
+type Made = (Vec<Chart>, Rungs);
+
+/// Cuts a surface into charts under the stretch limit of `settings`, sorted by lowest face. `components` holds the faces of
+/// each connected piece, ascending.
+///
+/// # Errors
+/// The caller cancelled, or there is not enough memory.
+pub(crate) fn cut(
+    surface: &Surface,
+    components: &Groups<FaceId>,
+    settings: &Settings,
+    run: &Run<'_>,
+) -> Result<Made, Cancelled> {
+    let charted = Charted::new(run.progress, surface.mesh.face_count());
+    let of_component = |component: usize| {
+        let faces = components.group(component);
+        (component, charts_of(&whole(surface, faces), faces, settings, &charted, run))
+    };
+    // The largest first, so that no long one starts last.
+    let mut order: Vec<usize> = (0..components.len()).collect();
+    order.sort_by_key(|&component| Reverse(components.group(component).len()));
+    let mut made: Vec<(usize, Result<Arc<Made>, Cancelled>)> =
+        order.into_par_iter().with_max_len(1).map(of_component).collect();
+    made.sort_unstable_by_key(|m| m.0);
+    let (mut charts, mut rungs) = (Vec::new(), Rungs::default());
+    for (_, component) in made {
+        let component = component?;
+        rungs.add(&component.1);
+        match Arc::try_unwrap(component) {
+            Ok((more, _)) => charts.extend(more),
+            Err(kept) => charts.extend_from_slice(&kept.0),
+        }
+    }
+    let (mesh, polygon) = (&surface.mesh, &surface.polygon);
+    if settings.limit_over == LimitOver::Atlas && settings.merge {
+        charts = join_within_atlas(mesh, polygon, charts, settings, &mut rungs, run)?;
+    }
+    if settings.coarse {
+        charts = cut_across(mesh, polygon, charts, settings, &mut rungs, run)?;
+    }
+    Ok((charts, rungs))
+}
+
+/// A component as a mesh of its own, which a connected surface is already.
+fn whole(surface: &Surface, faces: &[FaceId]) -> Patch {
+    let Surface { mesh, polygon, .. } = surface;
+    if faces.len() == mesh.face_count() {
+        return Patch::whole(Arc::clone(mesh), polygon.clone());
+    }
+    let (part, _) = mesh.submesh(faces, |_| false);
+    Patch::whole(Arc::new(part), faces.iter().map(|f| polygon[f.index()]).collect())
+}
+
+/// The charts of a component, which is `faces` of the surface, or what they were under the same settings but for those of
+/// later stages.
+fn charts_of(
+    whole: &Patch,
+    faces: &[FaceId],
+    settings: &Settings,
+    charted: &Charted<'_>,
+    run: &Run<'_>,
+) -> Result<Arc<Made>, Cancelled> {
+    let input = |f: &mut Fingerprint| {
+        f.mesh(&whole.mesh);
+        f.numbers(&whole.polygon);
+        // They are named in the result.
+        f.indices(faces.iter().map(|face| face.index()));
+        f.settings(&Settings {
+            limit_over: LimitOver::Chart,
+            chart_scale: ChartScale::Uniform,
+            packing: PackSettings::default(),
+            ..settings.clone()
+        });
+    };
+    let bytes = |made: &Made| made.0.iter().map(|c| cache::bytes_of(&c.patch.mesh) + 24 * c.uv.len()).sum();
+    run.recall(Kind::Charts, input, bytes, || component::charts(whole, faces, settings, charted, run))
+}

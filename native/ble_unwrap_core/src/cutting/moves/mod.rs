@@ -1,0 +1,60 @@
+//! What may be changed about a cutting. A move looks at the cutting and proposes edits; it flattens nothing itself.
+//!
+//! Moves on a patch that has no map to the plane yet say where to cut it: [`split`], [`dart`], [`net`]. Moves on charts make
+//! fewer or better ones of them: [`join`], [`partial_join`], [`hand_over`], [`across`].
+
+pub(super) mod across;
+pub(super) mod dart;
+pub(super) mod hand_over;
+pub(super) mod join;
+pub(super) mod net;
+pub(super) mod partial_join;
+pub(super) mod split;
+
+use crate::mesh::FaceId;
+
+use super::edit::Edit;
+use super::history::{History, MoveKind};
+use super::rigid_motion::Motion;
+use super::state::{ChartId, Corners, Cutting};
+
+/// An edit, and where the trial of it begins.
+#[derive(Clone, Debug)]
+pub(super) struct Proposal {
+    pub(super) edit: Edit,
+    pub(super) start: Start,
+}
+
+/// Where what an edit makes lies before it is flattened.
+#[derive(Clone, Debug)]
+pub(super) enum Start {
+    /// Where its faces lie now, but for those of one chart, which is moved rigidly.
+    Moved(ChartId, Motion),
+    /// Where its faces lie now, but for these, in ascending order. Nothing else may move.
+    Redrawn(Vec<(FaceId, Corners)>),
+    /// Where its faces lie now.
+    Lying,
+    /// Wherever an embedding puts it: it is made one chart from nothing, cut anew as its topology asks for.
+    Anew,
+}
+
+/// Two neighbouring charts with which a move could do something.
+#[derive(Debug)]
+pub(super) struct Site {
+    pub(super) charts: [ChartId; 2],
+    /// What it could do there, if that is known already.
+    pub(super) ways: Vec<Proposal>,
+}
+
+/// Makes one chart of two neighbours.
+pub(super) trait Move: Sync {
+    fn kind(&self) -> MoveKind;
+
+    /// Where it may be made, best first. A site that has been refused often enough is none, so that the search ends.
+    fn sites(&self, cutting: &Cutting<'_>, history: &History) -> Vec<Site>;
+
+    /// What is to be tried at a site, in this order, until something does.
+    fn ways(&self, _cutting: &Cutting<'_>, site: &Site) -> Vec<Proposal> {
+        site.ways.clone()
+    }
+}

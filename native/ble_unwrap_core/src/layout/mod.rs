@@ -1,0 +1,149 @@
+//! Charts to atlas: touch up, scale, pack, round, check, and mend what the checks find.
+
+mod mend;
+mod placed;
+mod scale;
+mod summary;
+mod touch_up;
+
+use std::collections::BTreeSet;
+
+use crate::atlas::Atlas;
+use crate::cache::Run;
+use crate::charts::Chart;
+use crate::clock::Clock;
+use crate::error::UnwrapError;
+use crate::flattening::Rungs;
+use crate::mesh::{MeshInput, Surface};
+use crate::metrics::{self, LayoutArrays, Texture};
+use crate::progress::Stage;
+use crate::settings::Settings;
+use crate::verify::{self, Certificate};
+
+use mend::Faults;
+use placed::Placed;
+
+/// Rounds of packing, checking and mending. Needles that rounding breaks are gone after one; the rest
+/// is for charts whose parts break again.
+const MOST_ROUNDS: usize = 12;
+/// Charts that came out too near are packed at least so many texels further apart.
+const LEAST_WIDENING: f64 = 1.0 / 16.0;
+
+/// Packs the charts and proves the result.
+pub(crate) fn lay_out(
+    input: &MeshInput<'_>,
+    surface: &Surface,
+    mut charts: Vec<Chart>,
+    mut rungs: Rungs,
+    settings: &Settings,
+    mut clock: Clock,
+    run: &Run<'_>,
+) -> Result<Atlas, UnwrapError> {
+    let arrays = LayoutArrays::new(input, surface);
+    let texture = Texture::of(&settings.packing);
+    let mut packing = settings.packing.clone();
+    let mut round = 0;
+    loop {
+        charts = touch_up::touch_up(charts, settings, &mut rungs, run.progress)?;
+        clock.lap("touch up");
+        run.progress.enter(Stage::Pack);
+        scale::scale(&mut charts, settings);
+        let layout = Placed::new(input, surface, &charts, &packing, run.progress)?;
+        clock.lap("pack");
+        run.progress.enter(Stage::Verify);
+        let mesh = arrays.uv_mesh(&layout.uv, &layout.face_chart, texture)?;
+        let certificate = verify::verify(&mesh, run.progress)?;
+        round += 1;
+        match next_step(&certificate, !layout.broken.is_empty(), round) {
+            NextStep::End => {
+                drop(charts);
+                let measures = metrics::measure(&mesh, run.progress)?;
+                clock.lap("verify");
+                let mut report = summary::report_of(input, surface, &layout, &measures, settings);
+                report.rungs = rungs.taken();
+                report.seconds = clock.into_laps();
+                let atlas = Atlas::proven(layout.uv, layout.polygon_chart, report, certificate)?;
+                run.progress.enter(Stage::Done);
+                return Ok(atlas);
+            }
+            NextStep::Widen(shortfall) => packing.margin_texels += shortfall,
+            NextStep::Mend => {
+                let faulty: BTreeSet<usize> =
+                    certificate.faulty_charts.iter().filter_map(|&c| usize::try_from(c).ok()).collect();
+                let faults = Faults { round, faulty: &faulty, broken: &layout.broken };
+                charts = mend::mend(surface, charts, &faults, &mut rungs, settings, run)?;
+            }
+        }
+        clock.lap("mend");
+    }
+}
+
+/// What follows from the checks of a layout.
+#[derive(Debug, PartialEq)]
+enum NextStep {
+    /// It is proven, or there is nothing left to try.
+    End,
+    /// Charts that break a rule are made anew.
+    Mend,
+    /// Charts are packed so many texels further apart: rounding has moved some towards each other.
+    Widen(f64),
+}
+
+/// `has_broken` tells whether rounding turned faces over; rounds count from 1.
+fn next_step(certificate: &Certificate, has_broken: bool, round: usize) -> NextStep {
+    let has_faults = has_broken || !certificate.faulty_charts.is_empty();
+    if round >= MOST_ROUNDS || certificate.is_valid() && !has_broken {
+        NextStep::End
+    } else if has_faults {
+        NextStep::Mend
+    } else if certificate.is_injective() && certificate.gap_texels < certificate.margin_texels {
+        NextStep::Widen(LEAST_WIDENING.max(certificate.margin_texels - certificate.gap_texels))
+    } else {
+        NextStep::End
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verify::Defect;
+
+    fn checked(change: impl FnOnce(&mut Certificate)) -> Certificate {
+        let mut certificate =
+            Certificate { complete: true, gap_texels: 4.0, margin_texels: 4.0, ..Certificate::default() };
+        change(&mut certificate);
+        certificate
+    }
+
+    #[test]
+    fn a_proven_layout_is_the_end_and_any_fault_is_mended_first() {
+        let proven = checked(|_| ());
+        assert_eq!(next_step(&proven, false, 1), NextStep::End);
+        assert_eq!(next_step(&proven, true, 1), NextStep::Mend);
+        let flipped = checked(|c| {
+            c.flipped = Defect { count: 1, first: Some(3) };
+            c.faulty_charts = vec![0];
+            c.gap_texels = 0.0;
+        });
+        assert_eq!(next_step(&flipped, false, 1), NextStep::Mend);
+        assert_eq!(next_step(&flipped, true, MOST_ROUNDS - 1), NextStep::Mend);
+        assert_eq!(next_step(&flipped, true, MOST_ROUNDS), NextStep::End, "with an error that carries the certificate");
+    }
+
+    #[test]
+    fn charts_too_near_are_packed_further_apart() {
+        let near = checked(|c| c.gap_texels = 3.75);
+        assert_eq!(next_step(&near, false, 1), NextStep::Widen(0.25));
+        let all_but = checked(|c| c.gap_texels = 3.9999);
+        assert_eq!(next_step(&all_but, false, 1), NextStep::Widen(LEAST_WIDENING));
+        assert_eq!(next_step(&near, false, MOST_ROUNDS), NextStep::End);
+    }
+
+    #[test]
+    fn what_cannot_be_checked_is_not_tried_for_ever() {
+        let endless = checked(|c| c.complete = false);
+        assert_eq!(next_step(&endless, false, 1), NextStep::End);
+        let unmeasured = checked(|c| c.gap_texels = f64::NAN);
+        assert_eq!(next_step(&unmeasured, false, 1), NextStep::End);
+    }
+}

@@ -1,0 +1,95 @@
+//! Charts packed into the texture and rounded to single precision.
+
+use nalgebra::{Point2, Point3};
+
+use crate::charts::Chart;
+use crate::error::UnwrapError;
+use crate::mesh::{FaceId, MeshInput, Surface, VertexId};
+use crate::packing::{self, PackItem, PackSettings, Packed};
+use crate::progress::Progress;
+use crate::rounding::{self, Rounding, RoundingError};
+
+use super::touch_up;
+
+/// Charts packed and rounded.
+pub(super) struct Placed {
+    pub(super) uv: Vec<[f32; 2]>,
+    pub(super) face_chart: Vec<i32>,
+    pub(super) polygon_chart: Vec<i32>,
+    /// Faces (of the surface) that rounding turned over, with their chart.
+    pub(super) broken: Vec<(usize, FaceId)>,
+    pub(super) specks: usize,
+}
+
+impl Placed {
+    pub(super) fn new(
+        input: &MeshInput<'_>,
+        surface: &Surface,
+        charts: &[Chart],
+        packing: &PackSettings,
+        progress: &Progress,
+    ) -> Result<Self, UnwrapError> {
+        let packed = pack(charts, packing, progress)?;
+        let size = packed.size.map(f64::from);
+        let rounding = Rounding { texel: size.map(|s| 1.0 / s), diagonal: diagonal(surface) };
+        let mut layout = Self {
+            uv: vec![[0.0; 2]; input.corner_vertices.len()],
+            face_chart: vec![-1; surface.mesh.face_count()],
+            polygon_chart: vec![-1; input.face_offsets.len().saturating_sub(1)],
+            broken: Vec::new(),
+            specks: packed.specks,
+        };
+        for (number, (chart, pose)) in charts.iter().zip(&packed.poses).enumerate() {
+            progress.check()?;
+            let place = |p: &Point2<f64>| {
+                let texel = pose.texel(*p);
+                Point2::new(texel.x / size[0], texel.y / size[1])
+            };
+            let exact: Vec<Point2<f64>> = chart.uv.iter().map(place).collect();
+            let halves = touch_up::convex_halves(chart);
+            let uv = match rounding::round_to_f32(&chart.patch.mesh, &halves, &exact, &rounding, progress) {
+                Ok(rounded) => rounded.uv,
+                Err(RoundingError::Cancelled(cancelled)) => return Err(cancelled.into()),
+                Err(RoundingError::Unmendable(unmendable)) => {
+                    let faces = unmendable.faces.iter().map(|f| (number, chart.patch.faces[f.index()]));
+                    layout.broken.extend(faces);
+                    unmendable.uv
+                }
+            };
+            let label = i32::try_from(number).unwrap_or(i32::MAX);
+            for (local, &face) in chart.patch.mesh.faces().zip(&chart.patch.faces) {
+                layout.face_chart[face.index()] = label;
+                layout.polygon_chart[surface.polygon[face.index()] as usize] = label;
+                for (vertex, h) in chart.patch.mesh.triangle(local).iter().zip(face.halfedges()) {
+                    layout.uv[surface.corner[h.index()] as usize] = uv[vertex.index()];
+                }
+            }
+        }
+        for &[corner, with] in &surface.followers {
+            layout.uv[corner as usize] = layout.uv[with as usize];
+        }
+        for &[polygon, with] in &surface.absorbed {
+            layout.polygon_chart[polygon as usize] = layout.polygon_chart[with as usize];
+        }
+        Ok(layout)
+    }
+}
+
+fn pack(charts: &[Chart], packing: &PackSettings, progress: &Progress) -> Result<Packed, UnwrapError> {
+    let index = |v: VertexId| u32::try_from(v.index()).unwrap_or(u32::MAX);
+    let triangles: Vec<Vec<[u32; 3]>> =
+        charts.iter().map(|c| c.patch.mesh.triangles().iter().map(|t| t.map(index)).collect()).collect();
+    let items: Vec<PackItem<'_>> =
+        charts.iter().zip(&triangles).map(|(c, t)| PackItem { points: &c.uv, triangles: t }).collect();
+    Ok(packing::pack(&items, packing, progress)?)
+}
+
+fn diagonal(surface: &Surface) -> f64 {
+    let mut low = Point3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY);
+    let mut high = -low;
+    for p in surface.mesh.positions() {
+        low = low.inf(p);
+        high = high.sup(p);
+    }
+    if surface.mesh.vertex_count() == 0 { 0.0 } else { (high - low).norm() }
+}

@@ -1,0 +1,59 @@
+//! What is reported of a layout.
+
+use crate::mesh::{MeshInput, Surface, measure};
+use crate::metrics::{self, Measures};
+use crate::report::{Report, counted};
+use crate::settings::{LimitOver, Settings};
+
+use super::placed::Placed;
+use super::touch_up;
+
+/// The figures of a layout, and what the user should know of it.
+pub(super) fn report_of(
+    input: &MeshInput<'_>,
+    surface: &Surface,
+    layout: &Placed,
+    measures: &Measures,
+    settings: &Settings,
+) -> Report {
+    let mut report = Report::new(measures, settings.chart_limit());
+    report.faces = input.face_offsets.len().saturating_sub(1);
+    report.unmapped_faces = surface.unmapped.len();
+    report.warnings = warnings(surface, layout);
+    if measures.faces > measures.unmapped_faces && measures.l2.is_nan() {
+        report.warnings.push(
+            "the stretch could not be measured: every triangle is thinner than single precision tells from none".into(),
+        );
+    }
+    report.bent_quads = metrics::bent_quads(input, &layout.uv, |face| layout.polygon_chart[face] >= 0).len();
+    if report.bent_quads > 0 {
+        report.warnings.push(touch_up::warning(report.bent_quads));
+    }
+    if let Some(&(chart, l2)) = report.charts_over_limit.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
+        report.warnings.push(format!(
+            "{} the stretch limit, the worst is chart {chart} with {l2:.3}",
+            counted(report.charts_over_limit.len(), ["chart exceeds", "charts exceed"])
+        ));
+    }
+    if settings.limit_over == LimitOver::Atlas {
+        report.atlas_limit = Some(settings.stretch_limit);
+        if report.l2_chart_scale > settings.stretch_limit {
+            let (l2, limit) = (report.l2_chart_scale, settings.stretch_limit);
+            report.warnings.push(format!("the atlas has a stretch of {l2:.3}, above the limit of {limit}"));
+        }
+    }
+    report
+}
+
+fn warnings(surface: &Surface, layout: &Placed) -> Vec<String> {
+    let mut list = surface.defects.warnings();
+    if layout.specks > 0 {
+        let specks = counted(layout.specks, ["chart smaller than a texel was", "charts smaller than a texel were"]);
+        list.push(format!("{specks} enlarged to one"));
+    }
+    let area = measure::total_area(&surface.mesh);
+    if surface.mesh.face_count() > 0 && area <= 0.0 {
+        list.push("no face has an area".into());
+    }
+    list
+}
