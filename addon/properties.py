@@ -139,10 +139,10 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     weld: declared("weld")
     weld_distance: declared("weld_distance", soft_max=1.0, step=0.1, precision=6, unit="LENGTH")
     coarse: declared("coarse")
-    merge: declared("merge")
+    stretch_price: declared("stretch_price", soft_max=100.0, step=100, precision=2)
+    moves: declared("moves")
     holes: declared("holes")
     chart_scale: declared("chart_scale")
-    least_sewn: declared("least_sewn", soft_max=2.0, step=10, precision=2)
     crease_weight: declared("crease_weight", step=10, precision=2)
     seed: declared("seed")
 
@@ -191,8 +191,8 @@ ADVANCED_SETTINGS = (
     (
         "Charts",
         (
-            *("limit_over", "neighbours", "weld", "weld_distance", "coarse", "merge"),
-            *("least_sewn", "holes", "chart_scale", "seed"),
+            *("stretch_price", "limit_over", "neighbours", "weld", "weld_distance", "coarse"),
+            *("moves", "holes", "chart_scale", "seed"),
         ),
     ),
     ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max", "together_max")),

@@ -85,7 +85,7 @@ def test_crease_weight_draws_borders_to_creases():
     assert len(rims) == 96
     on_rim = {}
     for weight in (0, 1, 2):
-        atlas = unwrap(*mesh, crease_weight=weight, stretch_limit=1.02, merge=False, least_sewn=1000)
+        atlas = unwrap(*mesh, crease_weight=weight, stretch_limit=1.02, moves="split")
         on_rim[weight] = len(borders(mesh, arrays(atlas)[1]) & rims)
     assert on_rim[0] < 10 and min(on_rim[1], on_rim[2]) > 30, on_rim
 

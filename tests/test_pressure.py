@@ -212,7 +212,7 @@ def test_charts_are_counted_as_they_are_labelled():
         vertices, faces = int(rng.integers(4, 9)), int(rng.integers(2, 9))
         sizes = rng.integers(3, 8, faces)
         corners = rng.integers(0, vertices, sizes.sum()).astype(np.int32)
-        atlas = unwrap(rng.random((vertices, 3)), corners, np.concatenate([[0], np.cumsum(sizes)]), merge=False)
+        atlas = unwrap(rng.random((vertices, 3)), corners, np.concatenate([[0], np.cumsum(sizes)]), moves="split")
         labels = set(np.asarray(atlas.chart).tolist()) - {-1}
         assert atlas.report["charts"] == len(labels), (corners.tolist(), sizes.tolist())
 

@@ -105,7 +105,7 @@ def charts_of(mesh, **settings):
 
 def compare_charts(mesh, methods=None):
     """The charts of an unwrap by each method: not merged and without darts, since those begin with other maps."""
-    _, charts = charts_of(mesh, coarse=False, merge=False, least_sewn=1000)
+    _, charts = charts_of(mesh, coarse=False, moves="split")
     return compare_patches(charts, methods or CHART_METHODS)
 
 

@@ -114,7 +114,7 @@ fn other_settings_keep_the_same_promises() {
     ];
     let mut wide = Settings { chart_scale: ChartScale::Stretch, holes: Holes::Cut, ..Settings::default() };
     (wide.packing.width, wide.packing.height, wide.packing.margin_texels) = (2048, 256, 3.0);
-    let mut large = Settings { merge: false, stretch_limit: 1.02, ..Settings::default() };
+    let mut large = Settings { moves: Moves::Split, stretch_limit: 1.02, ..Settings::default() };
     (large.packing.width, large.packing.height, large.packing.margin_texels) = (16_384, 16_384, 8.0);
     let mut small = Settings { stretch_limit: 3.0, weld: false, ..Settings::default() };
     (small.packing.width, small.packing.height, small.packing.margin_texels) = (96, 96, 0.5);

@@ -12,6 +12,7 @@ use crate::mesh::TriMesh;
 use crate::progress::Cancelled;
 use crate::settings::Settings;
 
+use super::history::Place;
 use super::moves::Site;
 use super::moves::join::{Join, Which};
 use super::search::tried;
@@ -97,8 +98,8 @@ impl Budget<'_> {
             if settings.stretch_limit.is_nan() || settings.stretch_limit <= 1.0 {
                 return Ok(None);
             }
-            let site = Site { charts: pair, ways: Vec::new() };
-            let (verdict, _) = tried(&self.cutting, &Join { which: Which::All }, &site, &settings, run)?;
+            let site = Site { place: Place::between(pair[0], pair[1]), charts: pair.to_vec(), ways: Vec::new() };
+            let (verdict, _) = tried(&self.cutting, &Join { which: Which::All }, &site, None, &settings, run)?;
             let Verdict::Charts(charts) = verdict else { return Ok(None) };
             let Ok([chart]) = <[Chart; 1]>::try_from(charts) else { return Ok(None) };
             let added = area * chart.l2 * chart.l2 - before[0] - before[1];

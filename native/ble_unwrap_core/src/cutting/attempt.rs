@@ -10,7 +10,7 @@ use crate::geodesics::LandmarkDistances;
 use crate::mesh::Topology;
 use crate::progress::Cancelled;
 use crate::segmentation::SpectralAnalysis;
-use crate::settings::{Holes, Settings};
+use crate::settings::{Holes, Moves, Settings};
 
 use super::measured::{Measured, analyse};
 use super::moves::dart::Bulging;
@@ -141,12 +141,16 @@ impl<'a> Attempt<'a> {
 
     /// How a patch bulges, for darts; `None` if none are wanted, or where that cannot be told.
     fn bulging<'p>(&'p self, patch: Cow<'p, Patch>) -> Result<Option<Bulging<'p>>, Cancelled> {
-        if self.settings.wants_darts() { Bulging::of(patch, self.settings.stretch_limit, self.run) } else { Ok(None) }
+        if self.settings.moves == Moves::All {
+            Bulging::of(patch, self.settings.stretch_limit, self.run)
+        } else {
+            Ok(None)
+        }
     }
 
     /// A box or the like, unfolded.
     fn net(&self, rungs: &mut Rungs) -> Option<Chart> {
-        let net = if self.settings.wants_darts() { net::net(self.patch())? } else { return None };
+        let net = if self.settings.moves == Moves::All { net::net(self.patch())? } else { return None };
         let flat = flattening::isometric(&net, rungs)?;
         rungs.take(Rung::Dart);
         Some(flat.into_chart(net))

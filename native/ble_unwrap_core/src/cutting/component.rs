@@ -49,7 +49,7 @@ pub(crate) fn charts(
     } else {
         let patches = unrolling.unwrap_or_else(|| vec![whole.clone()]);
         let charts = fine.charts(patches, settings, &mut rungs, &|faces| charted.add(faces, 1.0), run)?;
-        fine.join_partly(charts, settings, &mut rungs, run)?
+        fine.close(charts, settings, &mut rungs, run)?
     };
     charts = hand_over(&whole.mesh, &whole.polygon, charts, settings, &mut rungs, run)?;
     for f in charts.iter_mut().flat_map(|c| &mut c.patch.faces) {

@@ -2,20 +2,41 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::mesh::HalfedgeId;
+
 use super::state::ChartId;
 
-/// The moves that make one chart of two neighbours.
+/// The moves on charts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum MoveKind {
-    /// They are glued along their whole border, or a run of it.
+    /// Two charts are glued along their whole border, or a run of it.
     Join,
     /// The same, embedded anew.
     JoinAnew,
-    /// They are glued along a part of a run.
+    /// Two charts are glued along a part of a run.
     PartialJoin,
+    /// A chart is opened from where it bulges.
+    Slit,
+    /// A cut in a chart is closed from its end on.
+    Zip,
 }
 
-/// How often a move was refused for two charts, and how it was the last time.
+/// Where a move is made, for as long as the charts there stay what they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Place {
+    /// Between two charts, the lower name first.
+    Between(ChartId, ChartId),
+    /// At an edge, of which this is the lower side.
+    At(HalfedgeId),
+}
+
+impl Place {
+    pub(super) fn between(a: ChartId, b: ChartId) -> Self {
+        Self::Between(a.min(b), a.max(b))
+    }
+}
+
+/// How often a move was refused at a place, and how it was the last time.
 #[derive(Clone, Copy, Debug, Default)]
 struct Refusals {
     count: usize,
@@ -25,15 +46,10 @@ struct Refusals {
 /// The refused trials of one search. A chart that is new has none.
 #[derive(Debug, Default)]
 pub(super) struct History {
-    /// By the move and the charts, the lower name first.
-    refusals: BTreeMap<(MoveKind, [ChartId; 2]), Refusals>,
+    refusals: BTreeMap<(MoveKind, Place), Refusals>,
     failures: BTreeMap<(MoveKind, ChartId), usize>,
     /// Charts that a split has made since all neighbours were tried with each other, and what they were joined to.
     split: BTreeSet<ChartId>,
-}
-
-fn sorted([a, b]: [ChartId; 2]) -> [ChartId; 2] {
-    [a.min(b), a.max(b)]
 }
 
 impl History {
@@ -46,35 +62,35 @@ impl History {
         self.split.contains(&id)
     }
 
-    /// Notes that charts are known not to go together, without a trial.
-    pub(super) fn exclude(&mut self, by: MoveKind, charts: [ChartId; 2]) {
-        self.refusals.entry((by, sorted(charts))).or_default().count += 1;
+    /// Notes that a move is known to come to nothing, without a trial.
+    pub(super) fn exclude(&mut self, by: MoveKind, place: Place) {
+        self.refusals.entry((by, place)).or_default().count += 1;
     }
 
     /// Notes a trial that came to nothing; `had_bad_start` where another start might do.
-    pub(super) fn refuse(&mut self, by: MoveKind, charts: [ChartId; 2], had_bad_start: bool) {
-        self.exclude(by, charts);
-        self.refusals.entry((by, sorted(charts))).or_default().had_bad_start = had_bad_start;
-        for id in charts {
+    pub(super) fn refuse(&mut self, by: MoveKind, place: Place, charts: &[ChartId], had_bad_start: bool) {
+        self.exclude(by, place);
+        self.refusals.entry((by, place)).or_default().had_bad_start = had_bad_start;
+        for &id in charts {
             *self.failures.entry((by, id)).or_default() += 1;
         }
     }
 
     /// Notes that charts have been replaced by others.
-    pub(super) fn replace(&mut self, old: [ChartId; 2], new: &[ChartId]) {
+    pub(super) fn replace(&mut self, old: &[ChartId], new: &[ChartId]) {
         if old.iter().any(|&id| self.is_from_split(id)) {
             self.split.extend(new);
         }
     }
 
-    /// How often a move was refused for two charts.
-    pub(super) fn refusals(&self, by: MoveKind, charts: [ChartId; 2]) -> usize {
-        self.refusals.get(&(by, sorted(charts))).map_or(0, |r| r.count)
+    /// How often a move was refused at a place.
+    pub(super) fn refusals(&self, by: MoveKind, place: Place) -> usize {
+        self.refusals.get(&(by, place)).map_or(0, |r| r.count)
     }
 
-    /// Whether the last trial of a move on two charts began badly.
-    pub(super) fn had_bad_start(&self, by: MoveKind, charts: [ChartId; 2]) -> bool {
-        self.refusals.get(&(by, sorted(charts))).is_some_and(|r| r.had_bad_start)
+    /// Whether the last trial of a move at a place began badly.
+    pub(super) fn had_bad_start(&self, by: MoveKind, place: Place) -> bool {
+        self.refusals.get(&(by, place)).is_some_and(|r| r.had_bad_start)
     }
 
     /// In how many trials of a move that came to nothing a chart took part.
@@ -96,22 +112,21 @@ mod tests {
         let cutting = Cutting::new(&mesh, &polygon, charts);
         let ids: Vec<ChartId> = cutting.ids().collect();
         let mut history = History::default();
-        history.refuse(MoveKind::Join, [ids[1], ids[0]], true);
-        history.refuse(MoveKind::Join, [ids[1], ids[2]], false);
-        history.exclude(MoveKind::Join, [ids[0], ids[2]]);
-        let pair = |a: usize, b: usize| [ids[a], ids[b]];
-        assert_eq!(history.refusals(MoveKind::Join, pair(0, 1)), 1);
-        assert_eq!(history.refusals(MoveKind::Join, pair(2, 0)), 1);
-        assert_eq!(history.refusals(MoveKind::JoinAnew, pair(0, 1)), 0);
-        assert!(
-            history.had_bad_start(MoveKind::Join, pair(0, 1)) && !history.had_bad_start(MoveKind::Join, pair(1, 2))
-        );
+        let place = |a: usize, b: usize| Place::between(ids[a], ids[b]);
+        history.refuse(MoveKind::Join, place(1, 0), &[ids[1], ids[0]], true);
+        history.refuse(MoveKind::Join, place(1, 2), &[ids[1], ids[2]], false);
+        history.exclude(MoveKind::Join, place(0, 2));
+        assert_eq!(history.refusals(MoveKind::Join, place(0, 1)), 1);
+        assert_eq!(history.refusals(MoveKind::Join, place(2, 0)), 1);
+        assert_eq!(history.refusals(MoveKind::JoinAnew, place(0, 1)), 0);
+        assert!(history.had_bad_start(MoveKind::Join, place(0, 1)));
+        assert!(!history.had_bad_start(MoveKind::Join, place(1, 2)));
         let failures: Vec<usize> = ids.iter().map(|&id| history.failures(MoveKind::Join, id)).collect();
         assert_eq!(failures, [1, 2, 1], "what is known without a trial is no failure");
         history.note_split(ids[2]);
-        history.replace(pair(0, 1), &ids[..1]);
+        history.replace(&ids[..2], &ids[..1]);
         assert!(!history.is_from_split(ids[0]));
-        history.replace(pair(1, 2), &ids[1..2]);
+        history.replace(&ids[1..], &ids[1..2]);
         assert!(history.is_from_split(ids[1]));
     }
 }

@@ -10,6 +10,7 @@ mod attempt;
 mod border;
 mod charted;
 mod component;
+mod cost;
 mod divide;
 mod edit;
 mod history;
@@ -33,7 +34,7 @@ use crate::flattening::Rungs;
 use crate::mesh::{FaceId, Groups, Surface};
 use crate::packing::PackSettings;
 use crate::progress::Cancelled;
-use crate::settings::{ChartScale, LimitOver, Settings};
+use crate::settings::{ChartScale, LimitOver, Moves, Settings};
 
 use atlas_limit::join_within_atlas;
 use charted::Charted;
@@ -76,10 +77,10 @@ pub(crate) fn cut(
         }
     }
     let (mesh, polygon) = (&surface.mesh, &surface.polygon);
-    if settings.limit_over == LimitOver::Atlas && settings.merge {
+    if settings.limit_over == LimitOver::Atlas && settings.moves >= Moves::Join {
         charts = join_within_atlas(mesh, polygon, charts, settings, &mut rungs, run)?;
     }
-    if settings.coarse {
+    if settings.moves == Moves::All {
         charts = cut_across(mesh, polygon, charts, settings, &mut rungs, run)?;
     }
     Ok((charts, rungs))

@@ -1,14 +1,16 @@
-//! The search: trials of moves at many places at once, and those done that come to something.
+//! The search: trials of moves at many places at once, and those made by which the cost falls.
 
 use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 
 use crate::cache::Run;
+use crate::charts::Chart;
 use crate::flattening::{Rung, Rungs};
 use crate::progress::Cancelled;
 use crate::settings::Settings;
 
+use super::cost::Price;
 use super::history::{History, MoveKind};
 use super::moves::{Move, Site};
 use super::state::{ChartId, Cutting};
@@ -17,8 +19,8 @@ use super::trial::{Verdict, trial};
 /// Makes moves until none is left to be tried. In each round the first of `moves` that has any sites is tried at as many as
 /// have no chart in common, best first, in parallel; so a later one waits until the earlier ones have nothing left to do.
 ///
-/// It ends because every round makes a chart of two or notes a refusal, and a move has no site that was refused often enough.
-/// The result does not depend on the number of threads.
+/// It ends because the cost falls with every move that is made, every other trial is noted, and a move has no site that was
+/// refused often enough. The result does not depend on the number of threads.
 pub(super) fn search(
     cutting: &mut Cutting<'_>,
     history: &mut History,
@@ -27,15 +29,19 @@ pub(super) fn search(
     rungs: &mut Rungs,
     run: &Run<'_>,
 ) -> Result<(), Cancelled> {
+    let price = Price::new(cutting.mesh(), settings);
     loop {
         run.progress.check()?;
         let found = moves.iter().find_map(|made| {
-            let sites = disjoint(made.sites(cutting, history));
+            let sites = disjoint(made.sites(cutting, history, &price));
             (!sites.is_empty()).then_some((made, sites))
         });
         let Some((made, sites)) = found else { return Ok(()) };
-        let trials: Vec<Result<(Verdict, Rungs), Cancelled>> =
-            sites.par_iter().with_max_len(1).map(|site| tried(cutting, *made, site, settings, run)).collect();
+        let trials: Vec<Result<(Verdict, Rungs), Cancelled>> = sites
+            .par_iter()
+            .with_max_len(1)
+            .map(|site| tried(cutting, *made, site, Some(&price), settings, run))
+            .collect();
         for (site, trial) in sites.iter().zip(trials) {
             let (verdict, steps) = trial?;
             match verdict {
@@ -43,9 +49,9 @@ pub(super) fn search(
                     rungs.add(&steps);
                     rungs.take(rung_of(made.kind()));
                     let new = cutting.replace(&site.charts, charts);
-                    history.replace(site.charts, &new);
+                    history.replace(&site.charts, &new);
                 }
-                refused => history.refuse(made.kind(), site.charts, matches!(refused, Verdict::BadStart)),
+                refused => history.refuse(made.kind(), site.place, &site.charts, matches!(refused, Verdict::BadStart)),
             }
         }
     }
@@ -55,7 +61,8 @@ pub(super) fn search(
 fn rung_of(kind: MoveKind) -> Rung {
     match kind {
         MoveKind::Join | MoveKind::JoinAnew => Rung::Merge,
-        MoveKind::PartialJoin => Rung::Dart,
+        MoveKind::PartialJoin | MoveKind::Slit => Rung::Dart,
+        MoveKind::Zip => Rung::Zip,
     }
 }
 
@@ -65,28 +72,35 @@ fn disjoint(mut sites: Vec<Site>) -> Vec<Site> {
     sites.retain(|site| {
         let is_free = site.charts.iter().all(|id| !taken.contains(id));
         if is_free {
-            taken.extend(site.charts);
+            taken.extend(&site.charts);
         }
         is_free
     });
     sites
 }
 
-/// What comes of a move at a site: the first of its ways that makes charts. One with a bad start tells that another may do.
+/// What comes of a move at a site: the first of its ways that makes charts, and where there is a price, is worth it. One with a
+/// bad start tells that another may do.
 pub(super) fn tried(
     cutting: &Cutting<'_>,
     made: &dyn Move,
     site: &Site,
+    price: Option<&Price>,
     settings: &Settings,
     run: &Run<'_>,
 ) -> Result<(Verdict, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
     let mut verdict = Verdict::Refused;
-    for way in made.ways(cutting, site) {
+    let old: Vec<&Chart> = site.charts.iter().filter_map(|&id| cutting.chart(id)).collect();
+    for way in made.ways(cutting, site, run)? {
         match trial(cutting, &way, settings, &mut rungs, run)? {
             Verdict::Refused => (),
             Verdict::BadStart => verdict = Verdict::BadStart,
-            charts @ Verdict::Charts(_) => return Ok((charts, rungs)),
+            Verdict::Charts(charts) => {
+                if price.is_none_or(|price| price.is_worth(&old, &charts)) {
+                    return Ok((Verdict::Charts(charts), rungs));
+                }
+            }
         }
     }
     Ok((verdict, rungs))

@@ -5,7 +5,7 @@ use nalgebra::Point2;
 use crate::cache::Run;
 use crate::charts::{Chart, Patch};
 use crate::distortion::RestTriangle;
-use crate::flattening::{self, NEGLIGIBLE, Polished, Positions, Rungs};
+use crate::flattening::{self, NEGLIGIBLE, Polished, Positions, Rung, Rungs};
 use crate::mesh::FaceId;
 use crate::progress::Cancelled;
 use crate::settings::{Holes, Settings};
@@ -36,9 +36,10 @@ pub(super) fn trial(
 ) -> Result<Verdict, Cancelled> {
     run.progress.check()?;
     match &proposal.start {
-        Start::Moved(id, by) => moved(cutting, proposal, (*id, *by), settings, rungs, run),
+        Start::Glued(moved) => glued(cutting, proposal, *moved, settings, rungs, run),
         Start::Redrawn(anew) => Ok(redrawn(cutting, proposal, anew, settings)),
         Start::Lying => parts(cutting, proposal, settings, rungs, run),
+        Start::Opened => opened(cutting, proposal, settings, rungs, run),
         Start::Anew => made_anew(cutting, proposal, settings, rungs, run),
     }
 }
@@ -49,11 +50,11 @@ fn may_be_chart(patch: &Patch, settings: &Settings) -> bool {
     topology.is_chart() && (settings.holes == Holes::Keep || topology.loops == 1)
 }
 
-/// Charts laid side by side become one: what does not meet is spread over its whole map, and the stretch minimised.
-fn moved(
+/// What is glued becomes one chart: what does not meet is spread over its whole map, and the stretch minimised.
+fn glued(
     cutting: &Cutting<'_>,
     proposal: &Proposal,
-    (id, by): (ChartId, Motion),
+    moved: Option<(ChartId, Motion)>,
     settings: &Settings,
     rungs: &mut Rungs,
     run: &Run<'_>,
@@ -65,7 +66,10 @@ fn moved(
     }
     let draw = |f: &FaceId| {
         let corners = cutting.corners(*f);
-        if cutting.owner(*f) == Some(id) { corners.map(|p| by.apply(p)) } else { corners }
+        match moved {
+            Some((id, by)) if cutting.owner(*f) == Some(id) => corners.map(|p| by.apply(p)),
+            _ => corners,
+        }
     };
     let drawn: Vec<Corners> = patch.faces.iter().map(draw).collect();
     Ok(match flattening::sewn(&patch, &drawn, settings, rungs, run)? {
@@ -91,6 +95,28 @@ fn made_anew(
     let seams = |chart: &Chart| chart.patch.mesh.boundary_length();
     let shorter = chart.filter(|chart| seams(chart) <= before.iter().map(|chart| seams(chart)).sum());
     Ok(shorter.map_or(Verdict::Refused, |chart| Verdict::Charts(vec![chart])))
+}
+
+/// Charts that have been opened, minimised from where they lie.
+fn opened(
+    cutting: &Cutting<'_>,
+    proposal: &Proposal,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    run: &Run<'_>,
+) -> Result<Verdict, Cancelled> {
+    let mut charts = Vec::new();
+    for patch in proposal.edit.patches(cutting) {
+        if !may_be_chart(&patch, settings) {
+            return Ok(Verdict::Refused);
+        }
+        let start = positions(cutting, &patch, &[]);
+        match flattening::polish(&patch, &start, Rung::Prolonged, settings, rungs, run)? {
+            Polished::Flat(flat) => charts.push(flat.into_chart(patch)),
+            Polished::Refused | Polished::BadStart => return Ok(Verdict::Refused),
+        }
+    }
+    Ok(Verdict::Charts(charts))
 }
 
 /// Parts of charts, where they lie if that is under the limit of single charts, and else minimised.

@@ -5,11 +5,18 @@ use crate::charts::{Chart, Patch};
 use crate::flattening::Rungs;
 use crate::mesh::{FaceId, HalfedgeId};
 use crate::progress::Cancelled;
-use crate::settings::Settings;
+use crate::settings::{Moves, Settings};
 
+use super::cost::Price;
 use super::divide::{self, Charting};
+use super::history::History;
+use super::moves::Move;
 use super::moves::join::{self, Which};
-use super::moves::partial_join;
+use super::moves::partial_join::PartialJoin;
+use super::moves::slit::Slit;
+use super::moves::zip::Zip;
+use super::search::search;
+use super::state::Cutting;
 
 /// A connected mesh as a patch of itself.
 #[derive(Clone, Copy)]
@@ -27,8 +34,8 @@ impl Whole<'_> {
         Patch::cut_out(&self.patch.mesh, &self.patch.polygon, faces.to_vec(), is_cut)
     }
 
-    /// Charts patches that make up this mesh and joins charts that need not be apart. `done` is told the faces of each chart
-    /// that is made.
+    /// Charts patches that make up this mesh, joins charts that need not be apart, and opens them where that is worth it. `done`
+    /// is told the faces of each chart that is made.
     pub(super) fn charts(
         &self,
         patches: Vec<Patch>,
@@ -39,7 +46,9 @@ impl Whole<'_> {
     ) -> Result<Vec<Chart>, Cancelled> {
         let charting = divide::divide(patches, settings, done, run)?;
         rungs.add(&charting.rungs);
-        self.join(charting, Which::All, settings, rungs, run)
+        let charts = self.join(charting, Which::All, settings, rungs, run)?;
+        let slit = Slit { price: Price::new(&self.patch.mesh, settings) };
+        self.search(charts, &[&slit], settings, rungs, run)
     }
 
     /// Joins charts of this mesh along their borders, where that is wanted.
@@ -51,20 +60,38 @@ impl Whole<'_> {
         rungs: &mut Rungs,
         run: &Run<'_>,
     ) -> Result<Vec<Chart>, Cancelled> {
-        if !settings.merge {
+        if settings.moves < Moves::Join {
             return Ok(charting.charts);
         }
         join::join(&self.patch.mesh, &self.patch.polygon, charting, which, settings, rungs, run)
     }
 
-    /// Joins charts of this mesh along parts of their borders, where that is wanted.
-    pub(super) fn join_partly(
+    /// Joins charts of this mesh along parts of their borders, and closes cuts from their ends on. No face changes its chart but by
+    /// a join.
+    pub(super) fn close(
         &self,
         charts: Vec<Chart>,
         settings: &Settings,
         rungs: &mut Rungs,
         run: &Run<'_>,
     ) -> Result<Vec<Chart>, Cancelled> {
-        partial_join::join_partly(&self.patch.mesh, &self.patch.polygon, charts, settings, rungs, run)
+        self.search(charts, &[&PartialJoin, &Zip { limit: settings.stretch_limit }], settings, rungs, run)
+    }
+
+    /// Makes moves on charts of this mesh, if all moves are wanted.
+    fn search(
+        &self,
+        charts: Vec<Chart>,
+        moves: &[&dyn Move],
+        settings: &Settings,
+        rungs: &mut Rungs,
+        run: &Run<'_>,
+    ) -> Result<Vec<Chart>, Cancelled> {
+        if settings.moves < Moves::All {
+            return Ok(charts);
+        }
+        let mut cutting = Cutting::new(&self.patch.mesh, &self.patch.polygon, charts);
+        search(&mut cutting, &mut History::default(), moves, settings, rungs, run)?;
+        Ok(cutting.into_charts())
     }
 }

@@ -35,6 +35,8 @@ pub(crate) enum Rung {
     Thicken,
     /// Two charts joined to one.
     Merge,
+    /// A cut was closed from its end on.
+    Zip,
     /// A few polygons crushed at a border were handed over it.
     Recut,
     /// Quads that came out bent were made convex.
@@ -44,7 +46,7 @@ pub(crate) enum Rung {
 }
 
 impl Rung {
-    const ALL: [Self; 19] = [
+    const ALL: [Self; 20] = [
         Self::Plane,
         Self::Unfold,
         Self::Projection,
@@ -61,6 +63,7 @@ impl Rung {
         Self::Separate,
         Self::Thicken,
         Self::Merge,
+        Self::Zip,
         Self::Recut,
         Self::Unbend,
         Self::Relax,
@@ -86,6 +89,7 @@ impl Rung {
             Self::Separate => "separate",
             Self::Thicken => "thicken",
             Self::Merge => "merge",
+            Self::Zip => "zip",
             Self::Recut => "recut",
             Self::Unbend => "unbend",
             Self::Relax => "relax",

@@ -11,7 +11,7 @@ use crate::distortion::{self, RestTriangle};
 use crate::flattening::{self, Rung, Rungs};
 use crate::mesh::{Quad, VertexId};
 use crate::progress::{Cancelled, Progress};
-use crate::settings::{LimitOver, Settings};
+use crate::settings::{LimitOver, Moves, Settings};
 use crate::stretch::{self, StretchError};
 
 /// The L2 stretch of a chart may rise by so much for its L-infinity stretch to fall.
@@ -75,7 +75,7 @@ fn touched_up(
             rungs.take(Rung::Unbend);
         }
     }
-    if settings.coarse {
+    if settings.moves == Moves::All {
         let most = limit.min(first + rise).min(chart.l2 + MOST_RISE);
         let is_allowed = |uv: &[Point2<f64>]| flattening::l2(&chart.patch, &rest, uv) <= most;
         let lowered = stretch::lower_peaks(&mesh, &rest, &quads, &chart.uv, &is_allowed, progress);

@@ -29,8 +29,8 @@ const PAPER_TOGETHER_MAX: usize = 2_000;
 /// Most vertices of a patch whose distances to each other can be handled: 8 GB and minutes.
 pub(crate) const MOST_TOGETHER: usize = 20_000;
 
-/// The value of [`Settings::least_sewn`] from which on charts have no darts.
-pub const NEVER_SEWN: f64 = 1e3;
+/// The default of [`Settings::stretch_price`].
+const DEFAULT_STRETCH_PRICE: f64 = 0.0;
 
 /// What happens to the holes of a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +45,26 @@ pub enum Holes {
 choices!(Holes {
     Keep: "keep", "Keep", "A chart may have holes, and other charts may be packed into them.";
     Cut: "cut", "Cut", "Every chart is cut open to a disk.";
+});
+
+/// What the search for charts may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Moves {
+    /// Patches are split until every part keeps the limit; nothing is joined.
+    Split,
+    /// Neighbouring charts are joined again where their union keeps the limit, too, as in iso-charts and the paper.
+    Join,
+    /// Charts may also be cut open by darts and into nets, be split at hard edges, be joined along a part of their border,
+    /// hand polygons over a border that squeezes them, have cuts closed again from their ends, and be cut across where they are
+    /// too long for the texture; and their highest stretch is lowered in the end.
+    All,
+}
+
+choices!(Moves {
+    Split: "split", "Split", "Patches are split until they keep the stretch limit.";
+    Join: "join", "Split and Join", "Neighbouring charts are joined again where they keep the limit together.";
+    All: "all", "All", "Charts may be cut open, unfolded and joined along a part of their border, too.";
 });
 
 /// How charts are scaled relative to each other.
@@ -122,17 +142,15 @@ pub struct Settings {
     /// from a polygon, however large the distance.
     pub weld_distance: Option<f64>,
     /// Whether large components are first cut on a coarse copy of the mesh. When it is off, as in the paper's presets,
-    /// trial embeddings also use the full number of landmarks, and charts too long for the texture are not cut across.
+    /// trial embeddings also use the full number of landmarks.
     pub coarse: bool,
-    /// Whether neighbouring charts are joined again where their union stays under the limit, and whether polygons at their
-    /// borders that come out crushed are handed over to the neighbouring chart.
-    pub merge: bool,
-    /// The least length of a border that is sewn. Two charts whose union would be over the limit are sewn along a part of
-    /// their common border, and the rest of the border stays open as a dart, if that part is at least this many times as
-    /// long as the square root of the smaller chart's area. Lower values give fewer charts and shorter seams; higher values
-    /// give compact charts. From [`NEVER_SEWN`] on no charts are sewn like this; patches are not cut open by darts or into
-    /// nets before they are split, either, and crushed polygons are not handed over.
-    pub least_sewn: f64,
+    /// What the search for charts may do.
+    pub moves: Moves,
+    /// What stretch costs beside seams: how long a seam, in square roots of the surface's area, an excess of 1 of the squared
+    /// L2 stretch over the whole surface is worth. Charts are cut further where that saves more stretch than it costs seam,
+    /// and joined only where it does not. With 0, stretch under the limit costs nothing, and seams are as short as the limit
+    /// allows.
+    pub stretch_price: f64,
     /// What happens to the holes of charts.
     pub holes: Holes,
     /// How charts are scaled relative to each other.
@@ -164,8 +182,8 @@ impl Default for Settings {
             weld: false,
             weld_distance: None,
             coarse: true,
-            merge: true,
-            least_sewn: 0.2,
+            moves: Moves::All,
+            stretch_price: DEFAULT_STRETCH_PRICE,
             holes: Holes::Keep,
             chart_scale: ChartScale::Uniform,
             together_max: 0,
@@ -191,7 +209,8 @@ impl Settings {
         Self {
             holes: Holes::Cut,
             coarse: false,
-            least_sewn: NEVER_SEWN,
+            moves: Moves::Join,
+            stretch_price: 0.0,
             segmentation: SegmentationSettings::paper(),
             together_max: PAPER_TOGETHER_MAX,
             geodesics: GeodesicSettings::paper(),
@@ -212,12 +231,6 @@ impl Settings {
 }
 
 impl Settings {
-    /// Whether charts may be cut open by darts, to nets, or have polygons handed over their borders: [`Settings::least_sewn`]
-    /// is below [`NEVER_SEWN`].
-    pub(crate) fn wants_darts(&self) -> bool {
-        self.least_sewn < NEVER_SEWN
-    }
-
     /// What a mesh is conditioned with.
     #[must_use]
     pub(crate) fn conditioning(&self) -> ConditionOptions {

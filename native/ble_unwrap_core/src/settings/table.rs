@@ -9,7 +9,7 @@ use crate::packing::PackSettings;
 use crate::segmentation::SegmentationSettings;
 
 use super::interval::Interval;
-use super::{MOST_TOGETHER, NEVER_SEWN, Settings};
+use super::{MOST_TOGETHER, Settings};
 
 /// One row of the table.
 #[derive(Clone, Copy, Debug)]
@@ -379,11 +379,11 @@ pub static TABLE: &[Setting] = &[
         "How near to each other vertices are that are welded. Two vertices of one face never are, unless they coincide."),
     row("coarse", "Coarse First", Group::Limit, Kind::Flag(|s| &mut s.coarse), "",
         "Decides on a coarse copy where to cut large pieces of surface, which is many times faster."),
-    row("merge", "Merge Charts", Group::Charts, Kind::Flag(|s| &mut s.merge), "",
-        "Joins neighbouring charts again where their union stays within the stretch limit."),
-    row("least_sewn", "Least Sewn", Group::Charts, Kind::Real(|s| &mut s.least_sewn, Interval::closed(0.0, NEVER_SEWN)), "width of the chart",
-        "Two charts are sewn along a part of their border, the rest of which stays open as a dart, if that part is at least this \
-         long beside the width of the smaller one. Less gives fewer charts, more gives compact ones, the most makes no darts."),
+    row("stretch_price", "Stretch Price", Group::Charts, Kind::Real(|s| &mut s.stretch_price, Interval::closed(0.0, 1e3)), "width of the surface",
+        "How much more seam less stretch is worth: the length of seam for an excess of 1 of the squared stretch. \
+         0 makes seams as short as the limit allows; more gives less stretch and more charts."),
+    row("moves", "Moves", Group::Charts, Kind::Choice(|s| &mut s.moves), "",
+        "What the search for charts may do."),
     row("holes", "Holes", Group::Charts, Kind::Choice(|s| &mut s.holes), "",
         "What happens to charts with holes."),
     row("chart_scale", "Chart Scale", Group::Charts, Kind::Choice(|s| &mut s.chart_scale), "",

@@ -15,7 +15,7 @@ use crate::mesh::{self, Coarse, FaceId, Groups, HalfedgeId, TriMesh};
 use crate::progress::Cancelled;
 use crate::rounds::{self, Outcome};
 use crate::segmentation::{self, Segmentation};
-use crate::settings::Settings;
+use crate::settings::{Moves, Settings};
 
 use super::divide::{self, Charting};
 use super::moves::dart;
@@ -114,7 +114,7 @@ impl<'a> OnCoarse<'a> {
         for (i, chart) in charts.iter().enumerate() {
             chart.patch.faces.iter().for_each(|f| number[f.index()] = Some(i));
         }
-        let joined = whole.join_partly(charts, &self.strict, rungs, run)?;
+        let joined = whole.close(charts, &self.strict, rungs, run)?;
         Ok(self.join(parts, joined, &number))
     }
 
@@ -230,7 +230,7 @@ impl<'a> OnCoarse<'a> {
 
     /// A patch and its start, cut open where two edges join the same vertices, as far as the coarse chart was not.
     fn opened(&self, patch: Patch, start: Positions) -> (Patch, Positions) {
-        if self.settings.wants_darts() { dart::without_doubled_edges(patch, start) } else { (patch, start) }
+        if self.settings.moves == Moves::All { dart::without_doubled_edges(patch, start) } else { (patch, start) }
     }
 
     fn step(&self, part: &Part, rungs: &mut Rungs, run: &Run<'_>) -> Result<Outcome<Made, Part>, Cancelled> {

@@ -15,7 +15,7 @@ use crate::distortion::{self, RestTriangle};
 use crate::flattening::{Rung, Rungs};
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::progress::Cancelled;
-use crate::settings::Settings;
+use crate::settings::{Moves, Settings};
 
 use super::super::edit::Edit;
 use super::super::state::{Corners, Cutting};
@@ -51,7 +51,7 @@ pub(crate) fn hand_over(
     rungs: &mut Rungs,
     run: &Run<'_>,
 ) -> Result<Vec<Chart>, Cancelled> {
-    if !settings.merge || !settings.wants_darts() {
+    if settings.moves != Moves::All {
         return Ok(charts);
     }
     let unit = mesh.halfedges().map(|h| mesh.edge_length(h)).sum::<f64>() / mesh.halfedge_count().max(1) as f64;
@@ -261,7 +261,6 @@ mod tests {
     use crate::mesh::VertexId;
     use crate::mesh::test_surfaces;
     use crate::progress::Progress;
-    use crate::settings::NEVER_SEWN;
     use crate::stretch;
     use nalgebra::{Point2, Point3, Vector3};
 
@@ -403,8 +402,8 @@ mod tests {
         let guided = mesh.clone().with_guides(mesh.halfedges().map(on_border).collect());
         let squeezed = |mesh: &TriMesh| charts(mesh, &all, |p| p.x < 20.0, [&pushed, &flat]);
         assert_eq!(all_handed_over(&guided, &all, squeezed(&guided), &settings()).1, 0);
-        let apart = Settings { merge: false, ..settings() };
-        let no_darts = Settings { least_sewn: NEVER_SEWN, ..settings() };
+        let apart = Settings { moves: Moves::Split, ..settings() };
+        let no_darts = Settings { moves: Moves::Join, ..settings() };
         let over = Settings { stretch_limit: 1.0 + 1e-6, ..settings() };
         for settings in [apart, no_darts, over] {
             let mut rungs = Rungs::default();

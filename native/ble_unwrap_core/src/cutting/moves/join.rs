@@ -12,9 +12,10 @@ use crate::progress::Cancelled;
 use crate::settings::Settings;
 
 use super::super::border;
+use super::super::cost::Price;
 use super::super::divide::{Charting, Refused};
 use super::super::edit::Edit;
-use super::super::history::{History, MoveKind};
+use super::super::history::{History, MoveKind, Place};
 use super::super::search::search;
 use super::super::state::{ChartId, Cutting};
 use super::{Move, Proposal, Site, Start};
@@ -80,7 +81,7 @@ pub(crate) fn join(
     halves.sort_unstable();
     for pair in halves.chunk_by(|a, b| a.0 == b.0) {
         if let [(_, a), (_, b)] = *pair {
-            history.exclude(MoveKind::Join, [a, b]);
+            history.exclude(MoveKind::Join, Place::between(a, b));
         }
     }
     let moves: [&dyn Move; 2] = [&Join { which }, &JoinAnew { which: which.for_embedding(), refused: &refused }];
@@ -98,33 +99,33 @@ impl Move for Join {
         MoveKind::Join
     }
 
-    fn sites(&self, cutting: &Cutting<'_>, history: &History) -> Vec<Site> {
+    fn sites(&self, cutting: &Cutting<'_>, history: &History, _price: &Price) -> Vec<Site> {
         let is_open = |id: ChartId| history.failures(MoveKind::Join, id) < MOST_FAILURES;
         sites(cutting, |charts| {
             charts.iter().all(|&id| is_open(id))
-                && history.refusals(MoveKind::Join, charts) == 0
+                && history.refusals(MoveKind::Join, Place::between(charts[0], charts[1])) == 0
                 && self.which.includes(cutting, history, charts)
         })
     }
 
     /// Glued all along their border; where that has several runs, also along the longest alone, and open along the others.
-    fn ways(&self, cutting: &Cutting<'_>, site: &Site) -> Vec<Proposal> {
-        let [a, b] = site.charts;
+    fn ways(&self, cutting: &Cutting<'_>, site: &Site, _run: &Run<'_>) -> Result<Vec<Proposal>, Cancelled> {
+        let [a, b] = site.charts[..] else { return Ok(Vec::new()) };
         let mesh = cutting.mesh();
         let runs: Vec<Vec<HalfedgeId>> =
             border::runs(cutting, a, |other| other == b).into_iter().map(|run| run.edges).collect();
         let length = |run: &[HalfedgeId]| run.iter().map(|&h| mesh.edge_length(h)).sum::<f64>();
         let longest = runs.iter().max_by(|s, t| length(s).total_cmp(&length(t)).then(t[0].cmp(&s[0])));
-        let Some(longest) = longest else { return Vec::new() };
+        let Some(longest) = longest else { return Ok(Vec::new()) };
         let mut ways = vec![runs.concat()];
         if runs.len() > 1 {
             ways.push(longest.clone());
         }
         let proposal = |glue: Vec<HalfedgeId>| Proposal {
             edit: Edit::new(mesh, &glue, &[]),
-            start: Start::Moved(b, border::alignment(cutting, &glue)),
+            start: Start::Glued(Some((b, border::alignment(cutting, &glue)))),
         };
-        ways.into_iter().map(proposal).collect()
+        Ok(ways.into_iter().map(proposal).collect())
     }
 }
 
@@ -139,28 +140,28 @@ impl Move for JoinAnew<'_> {
         MoveKind::JoinAnew
     }
 
-    fn sites(&self, cutting: &Cutting<'_>, history: &History) -> Vec<Site> {
+    fn sites(&self, cutting: &Cutting<'_>, history: &History, _price: &Price) -> Vec<Site> {
         let is_open = |id: ChartId| history.failures(MoveKind::JoinAnew, id) < MOST_EMBEDDED;
         sites(cutting, |charts| {
             charts.iter().all(|&id| is_open(id))
-                && history.had_bad_start(MoveKind::Join, charts)
-                && history.refusals(MoveKind::JoinAnew, charts) == 0
+                && history.had_bad_start(MoveKind::Join, Place::between(charts[0], charts[1]))
+                && history.refusals(MoveKind::JoinAnew, Place::between(charts[0], charts[1])) == 0
                 && self.which.includes(cutting, history, charts)
         })
     }
 
-    fn ways(&self, cutting: &Cutting<'_>, site: &Site) -> Vec<Proposal> {
+    fn ways(&self, cutting: &Cutting<'_>, site: &Site, _run: &Run<'_>) -> Result<Vec<Proposal>, Cancelled> {
         let charts = site.charts.iter().filter_map(|&id| cutting.chart(id));
         let mut faces: Vec<FaceId> = charts.flat_map(|c| c.patch.faces.iter().copied()).collect();
         faces.sort_unstable();
         // What was split into more than two may have come together again.
         if self.refused.contains(&faces) {
-            return Vec::new();
+            return Ok(Vec::new());
         }
-        let [a, b] = site.charts;
+        let [a, b] = site.charts[..] else { return Ok(Vec::new()) };
         let glue: Vec<HalfedgeId> =
             border::runs(cutting, a, |other| other == b).into_iter().flat_map(|run| run.edges).collect();
-        vec![Proposal { edit: Edit::new(cutting.mesh(), &glue, &[]), start: Start::Anew }]
+        Ok(vec![Proposal { edit: Edit::new(cutting.mesh(), &glue, &[]), start: Start::Anew }])
     }
 }
 
@@ -174,7 +175,8 @@ fn sites(cutting: &Cutting<'_>, is_wanted: impl Fn([ChartId; 2]) -> bool) -> Vec
         .map(|([a, b], length)| (length / area(a).min(area(b)).max(f64::MIN_POSITIVE).sqrt(), [a, b]))
         .collect();
     scored.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
-    scored.into_iter().map(|(_, charts)| Site { charts, ways: Vec::new() }).collect()
+    let site = |[a, b]: [ChartId; 2]| Site { place: Place::between(a, b), charts: vec![a, b], ways: Vec::new() };
+    scored.into_iter().map(|(_, charts)| site(charts)).collect()
 }
 
 #[cfg(test)]
@@ -183,7 +185,7 @@ mod tests {
     use crate::charts::Patch;
     use crate::mesh::test_surfaces;
     use crate::progress::Progress;
-    use crate::settings::NEVER_SEWN;
+    use crate::settings::Moves;
     use nalgebra::{Point2, Point3, Rotation2, Vector2};
 
     use super::super::super::attempt;
@@ -240,8 +242,8 @@ mod tests {
         }
         let cutting = Cutting::new(&mesh, &polygon, charts.clone());
         let join = Join { which: Which::All };
-        let site = join.sites(&cutting, &History::default()).pop().expect("neighbours");
-        let lying = tried(&cutting, &join, &site, &settings, &run).expect("not cancelled").0;
+        let site = join.sites(&cutting, &History::default(), &Price::new(&mesh, &settings)).pop().expect("neighbours");
+        let lying = tried(&cutting, &join, &site, None, &settings, &run).expect("not cancelled").0;
         assert!(matches!(lying, Verdict::BadStart));
         let (charts, rungs) = merged([None, None], Which::All, &settings);
         assert_eq!(charts.len(), 1);
@@ -253,7 +255,7 @@ mod tests {
 
     #[test]
     fn a_union_over_the_limit_stays_two_whatever_its_start() {
-        let tight = Settings { stretch_limit: 1.0005, least_sewn: NEVER_SEWN, ..Settings::default() };
+        let tight = Settings { stretch_limit: 1.0005, moves: Moves::Join, ..Settings::default() };
         assert_eq!(merged([None, None], Which::All, &tight).0.len(), 2);
     }
 
@@ -294,9 +296,12 @@ mod tests {
         assert!(seam(&one) > sides.iter().map(seam).sum());
         let cutting = Cutting::new(&ball, &polygon, sides.to_vec());
         let (which, none) = (Which::All, Refused::default());
-        let site = Join { which }.sites(&cutting, &History::default()).pop().expect("neighbours");
+        let site = Join { which }
+            .sites(&cutting, &History::default(), &Price::new(&ball, &settings))
+            .pop()
+            .expect("neighbours");
         let anew = JoinAnew { which, refused: &none };
-        let joined = tried(&cutting, &anew, &site, &settings, &run).expect("not cancelled").0;
+        let joined = tried(&cutting, &anew, &site, None, &settings, &run).expect("not cancelled").0;
         assert!(matches!(joined, Verdict::Refused));
     }
 

@@ -1,7 +1,7 @@
 //! What may be changed about a cutting. A move looks at the cutting and proposes edits; it flattens nothing itself.
 //!
 //! Moves on a patch that has no map to the plane yet say where to cut it: [`split`], [`dart`], [`net`]. Moves on charts make
-//! fewer or better ones of them: [`join`], [`partial_join`], [`hand_over`], [`across`].
+//! fewer or better ones of them: [`join`], [`partial_join`], [`zip`], [`slit`], [`hand_over`], [`across`].
 
 pub(super) mod across;
 pub(super) mod dart;
@@ -9,12 +9,17 @@ pub(super) mod hand_over;
 pub(super) mod join;
 pub(super) mod net;
 pub(super) mod partial_join;
+pub(super) mod slit;
 pub(super) mod split;
+pub(super) mod zip;
 
+use crate::cache::Run;
 use crate::mesh::FaceId;
+use crate::progress::Cancelled;
 
+use super::cost::Price;
 use super::edit::Edit;
-use super::history::{History, MoveKind};
+use super::history::{History, MoveKind, Place};
 use super::rigid_motion::Motion;
 use super::state::{ChartId, Corners, Cutting};
 
@@ -28,33 +33,41 @@ pub(super) struct Proposal {
 /// Where what an edit makes lies before it is flattened.
 #[derive(Clone, Debug)]
 pub(super) enum Start {
-    /// Where its faces lie now, but for those of one chart, which is moved rigidly.
-    Moved(ChartId, Motion),
+    /// Where its faces lie now, but for those of one chart, which may be moved rigidly. What does not meet is spread over the
+    /// map.
+    Glued(Option<(ChartId, Motion)>),
     /// Where its faces lie now, but for these, in ascending order. Nothing else may move.
     Redrawn(Vec<(FaceId, Corners)>),
-    /// Where its faces lie now.
+    /// Where its faces lie now, and they may stay there if they are under the limit.
     Lying,
+    /// Where its faces lie now, but what has been opened is given room.
+    Opened,
     /// Wherever an embedding puts it: it is made one chart from nothing, cut anew as its topology asks for.
     Anew,
 }
 
-/// Two neighbouring charts with which a move could do something.
+/// A place at which a move could do something.
 #[derive(Debug)]
 pub(super) struct Site {
-    pub(super) charts: [ChartId; 2],
-    /// What it could do there, if that is known already.
+    pub(super) place: Place,
+    /// The charts that would be changed.
+    pub(super) charts: Vec<ChartId>,
+    /// What could be done there, if that is known already.
     pub(super) ways: Vec<Proposal>,
 }
 
-/// Makes one chart of two neighbours.
+/// A change of charts.
 pub(super) trait Move: Sync {
     fn kind(&self) -> MoveKind;
 
     /// Where it may be made, best first. A site that has been refused often enough is none, so that the search ends.
-    fn sites(&self, cutting: &Cutting<'_>, history: &History) -> Vec<Site>;
+    fn sites(&self, cutting: &Cutting<'_>, history: &History, price: &Price) -> Vec<Site>;
 
     /// What is to be tried at a site, in this order, until something does.
-    fn ways(&self, _cutting: &Cutting<'_>, site: &Site) -> Vec<Proposal> {
-        site.ways.clone()
+    ///
+    /// # Errors
+    /// The caller cancelled, or there is not enough memory.
+    fn ways(&self, _cutting: &Cutting<'_>, site: &Site, _run: &Run<'_>) -> Result<Vec<Proposal>, Cancelled> {
+        Ok(site.ways.clone())
     }
 }

@@ -8,64 +8,41 @@
 
 use nalgebra::{Complex, Point2};
 
-use crate::cache::Run;
-use crate::charts::Chart;
-use crate::flattening::Rungs;
-use crate::mesh::{HalfedgeId, TriMesh};
-use crate::progress::Cancelled;
-use crate::settings::Settings;
+use crate::mesh::HalfedgeId;
 
 use super::super::border::{self, BorderRun};
+use super::super::cost::Price;
 use super::super::edit::Edit;
-use super::super::history::{History, MoveKind};
+use super::super::history::{History, MoveKind, Place};
 use super::super::rigid_motion::longest_fit;
-use super::super::search::search;
 use super::super::state::{ChartId, Cutting};
 use super::{Move, Proposal, Site, Start};
 
 /// Charts are glued where their borders fit, by a rigid motion, up to this share (root of mean square over length) of the
 /// length that is glued: a straight border and an arc of 120°. If that is over the limit, once more where they fit closer.
 const FITS: [f64; 2] = [0.08, 0.03];
+/// What is glued is at least so many times as long as the square root of the smaller chart's area: a chart that hangs on by less
+/// is no easier to paint than one by itself.
+const LEAST_GLUED: f64 = 0.2;
 /// Failed trials a chart may take part in before it is left alone.
 const MOST_FAILURES: usize = 3;
 
-/// Joins charts of a mesh, longest glued part first, where they fit and stay under the limit. Each chart takes part in at
-/// most [`MOST_FAILURES`] failed trials, so the number of trials is linear in the number of charts. The charts come sorted by
-/// lowest face.
-pub(crate) fn join_partly(
-    mesh: &TriMesh,
-    polygon: &[u32],
-    charts: Vec<Chart>,
-    settings: &Settings,
-    rungs: &mut Rungs,
-    run: &Run<'_>,
-) -> Result<Vec<Chart>, Cancelled> {
-    let mut cutting = Cutting::new(mesh, polygon, charts);
-    if settings.merge && settings.wants_darts() {
-        let joins = PartialJoin { least_sewn: settings.least_sewn };
-        search(&mut cutting, &mut History::default(), &[&joins], settings, rungs, run)?;
-    }
-    Ok(cutting.into_charts())
-}
-
-/// Two charts as they lie, glued along a part of a run of their border.
-struct PartialJoin {
-    /// See [`Settings::least_sewn`].
-    least_sewn: f64,
-}
+/// Two charts as they lie, glued along a part of a run of their border, longest part first. Each chart takes part in at most
+/// [`MOST_FAILURES`] failed trials, so the number of trials is linear in the number of charts.
+pub(crate) struct PartialJoin;
 
 impl Move for PartialJoin {
     fn kind(&self) -> MoveKind {
         MoveKind::PartialJoin
     }
 
-    fn sites(&self, cutting: &Cutting<'_>, history: &History) -> Vec<Site> {
+    fn sites(&self, cutting: &Cutting<'_>, history: &History, _price: &Price) -> Vec<Site> {
         let is_open = |id: ChartId| history.failures(MoveKind::PartialJoin, id) < MOST_FAILURES;
         let mut parts: Vec<Part> = Vec::new();
         for id in cutting.ids().filter(|&id| is_open(id)) {
             // Each pair is looked at from one side.
             let runs = border::runs(cutting, id, |other| other > id && is_open(other));
-            parts.extend(runs.into_iter().filter_map(|run| self.part(cutting, history, id, &run)));
+            parts.extend(runs.into_iter().filter_map(|run| part(cutting, history, id, &run)));
         }
         parts.sort_by(|a, b| b.length.total_cmp(&a.length).then(a.first.cmp(&b.first)));
         parts.into_iter().map(|part| part.site).collect()
@@ -79,51 +56,53 @@ struct Part {
     site: Site,
 }
 
-impl PartialJoin {
-    /// The longest part of a run where the two charts fit.
-    fn part(&self, cutting: &Cutting<'_>, history: &History, id: ChartId, run: &BorderRun) -> Option<Part> {
-        let mesh = cutting.mesh();
-        let charts = [id, run.beyond];
-        let fit = *FITS.get(history.refusals(MoveKind::PartialJoin, charts))?;
-        let [one, other] = [cutting.chart(id)?.patch.area(), cutting.chart(run.beyond)?.patch.area()];
-        // Of a whole loop any part may be glued, wherever it begins, but for two edges at least.
-        let edges = if run.is_loop { run.edges.repeat(2) } else { run.edges.clone() };
-        let most_edges = if run.is_loop { run.edges.len().saturating_sub(2) } else { run.edges.len() };
-        let (first, last) = (*edges.first()?, *edges.last()?);
-        let number = |p: Point2<f64>| Complex::new(p.x, p.y);
-        // On this side an edge starts where the one beyond ends.
-        let here = edges.iter().map(|&h| cutting.start(h)).chain([cutting.end(last)]);
-        let there = [cutting.end(mesh.twin(first))].into_iter();
-        let there = there.chain(edges.iter().map(|&h| cutting.start(mesh.twin(h))));
-        let points: Vec<[Complex<f64>; 2]> = here.zip(there).map(|(p, q)| [number(p), number(q)]).collect();
-        let lengths: Vec<f64> = edges.iter().map(|&h| mesh.edge_length(h)).collect();
-        let window = longest_fit(&points, &lengths, most_edges, fit)?;
-        let glue = &edges[window.first..window.last];
-        (window.length >= self.least_sewn * one.min(other).sqrt()).then(|| Part {
-            length: window.length,
-            first: glue[0],
-            site: Site {
-                charts,
-                ways: vec![Proposal {
-                    edit: Edit::new(mesh, glue, &[]),
-                    start: Start::Moved(run.beyond, window.motion),
-                }],
-            },
-        })
-    }
+/// The longest part of a run where the two charts fit.
+fn part(cutting: &Cutting<'_>, history: &History, id: ChartId, run: &BorderRun) -> Option<Part> {
+    let mesh = cutting.mesh();
+    let fit = *FITS.get(history.refusals(MoveKind::PartialJoin, Place::between(id, run.beyond)))?;
+    let [one, other] = [cutting.chart(id)?.patch.area(), cutting.chart(run.beyond)?.patch.area()];
+    // Of a whole loop any part may be glued, wherever it begins, but for two edges at least.
+    let edges = if run.is_loop { run.edges.repeat(2) } else { run.edges.clone() };
+    let most_edges = if run.is_loop { run.edges.len().saturating_sub(2) } else { run.edges.len() };
+    let (first, last) = (*edges.first()?, *edges.last()?);
+    let number = |p: Point2<f64>| Complex::new(p.x, p.y);
+    // On this side an edge starts where the one beyond ends.
+    let here = edges.iter().map(|&h| cutting.start(h)).chain([cutting.end(last)]);
+    let there = [cutting.end(mesh.twin(first))].into_iter();
+    let there = there.chain(edges.iter().map(|&h| cutting.start(mesh.twin(h))));
+    let points: Vec<[Complex<f64>; 2]> = here.zip(there).map(|(p, q)| [number(p), number(q)]).collect();
+    let lengths: Vec<f64> = edges.iter().map(|&h| mesh.edge_length(h)).collect();
+    let window = longest_fit(&points, &lengths, most_edges, fit)?;
+    let glue = &edges[window.first..window.last];
+    (window.length >= LEAST_GLUED * one.min(other).sqrt()).then(|| Part {
+        length: window.length,
+        first: glue[0],
+        site: Site {
+            place: Place::between(id, run.beyond),
+            charts: vec![id, run.beyond],
+            ways: vec![Proposal {
+                edit: Edit::new(mesh, glue, &[]),
+                start: Start::Glued(Some((run.beyond, window.motion))),
+            }],
+        },
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::charts::Patch;
+    use crate::cache::Run;
+    use crate::charts::{Chart, Patch};
+    use crate::flattening::Rungs;
+    use crate::mesh::TriMesh;
     use crate::mesh::test_surfaces;
     use crate::progress::Progress;
-    use crate::settings::NEVER_SEWN;
+    use crate::settings::Settings;
     use crate::stretch;
     use nalgebra::Point3;
 
     use super::super::super::divide::divide;
+    use super::super::super::search::search;
 
     fn settings(stretch_limit: f64) -> Settings {
         Settings { stretch_limit, ..Settings::default() }
@@ -148,7 +127,11 @@ mod tests {
         let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
         let (count, progress, mut rungs) = (charts.len(), Progress::new(), Rungs::default());
         let run = Run::new(&progress, None);
-        let joined = join_partly(mesh, &polygon, charts, settings, &mut rungs, &run).expect("not cancelled");
+        let mut cutting = Cutting::new(mesh, &polygon, charts);
+        search(&mut cutting, &mut History::default(), &[&PartialJoin], settings, &mut rungs, &run)
+            .expect("not cancelled");
+        cutting.check_invariants().expect("sound");
+        let joined = cutting.into_charts();
         for chart in &joined {
             assert!(chart.patch.mesh.topology().is_chart());
             assert!(joined.len() == count || chart.l2 <= settings.stretch_limit);
@@ -185,7 +168,7 @@ mod tests {
         let mesh = test_surfaces::sphere(3);
         let settings = settings(1.1);
         let halves = charts(&mesh, &settings, hemisphere);
-        let least = settings.least_sewn * halves[0].patch.area().sqrt();
+        let least = LEAST_GLUED * halves[0].patch.area().sqrt();
         let before = seam(&halves);
         let (joined, _) = joined(&mesh, halves, &settings);
         assert_eq!(joined.len(), 1);
@@ -195,16 +178,12 @@ mod tests {
     }
 
     #[test]
-    fn what_would_be_over_the_limit_or_is_not_wanted_stays_apart() {
+    fn what_would_be_over_the_limit_stays_apart() {
         let mesh = test_surfaces::sphere(3);
         let loose = settings(1.1);
         let halves = charts(&mesh, &loose, hemisphere);
         let worst = halves.iter().map(|c| c.l2).fold(1.0, f64::max);
         let tight = settings(1.0 + 0.5 * (worst - 1.0));
-        assert_eq!(joined(&mesh, halves.clone(), &tight).0.len(), 2);
-        let never = Settings { least_sewn: NEVER_SEWN, ..loose.clone() };
-        assert_eq!(joined(&mesh, halves.clone(), &never).0.len(), 2);
-        let long = Settings { least_sewn: 2.0, ..loose };
-        assert_eq!(joined(&mesh, halves, &long).0.len(), 2);
+        assert_eq!(joined(&mesh, halves, &tight).0.len(), 2);
     }
 }

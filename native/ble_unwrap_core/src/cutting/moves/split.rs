@@ -7,7 +7,7 @@ use crate::charts::Patch;
 use crate::flattening::{Rung, Rungs};
 use crate::progress::Cancelled;
 use crate::segmentation::{self, Segmentation};
-use crate::settings::Settings;
+use crate::settings::{Moves, Settings};
 
 use super::super::measured::Measured;
 
@@ -19,7 +19,7 @@ const MOSTLY_UNROLLED: f64 = 0.9;
 /// The parts of a patch between its hard edges, if those that unroll have at least a share of its area, and not in the paper's
 /// presets.
 pub(crate) fn hard_parts(patch: &Patch, least_share: f64, settings: &Settings) -> Option<Vec<Patch>> {
-    if !settings.wants_darts() {
+    if settings.moves != Moves::All {
         return None;
     }
     let parts = segmentation::between_hard_edges(&patch.mesh, &patch.polygon, least_share)?;
