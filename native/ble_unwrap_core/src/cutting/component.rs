@@ -49,6 +49,7 @@ pub(crate) fn charts(
     } else {
         let patches = unrolling.unwrap_or_else(|| vec![whole.clone()]);
         let charts = fine.charts(patches, settings, &mut rungs, &|faces| charted.add(faces, 1.0), run)?;
+        let charts = fine.join_partly(charts, settings, &mut rungs, run)?;
         fine.close(charts, settings, &mut rungs, run)?
     };
     charts = hand_over(&whole.mesh, &whole.polygon, charts, settings, &mut rungs, run)?;

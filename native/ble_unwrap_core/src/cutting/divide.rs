@@ -12,6 +12,7 @@ use crate::rounds::{self, Outcome};
 use crate::settings::Settings;
 
 use super::attempt::Attempt;
+use super::cost::Price;
 use super::measured::Measured;
 use super::moves::split;
 
@@ -54,12 +55,13 @@ struct Piece {
     inherited: Option<LandmarkDistances>,
 }
 
-/// Cuts and flattens patches until every chart is under the limit. Rounds over all open pieces, in
+/// Cuts and flattens patches until every chart is under the limit, and no split can be worth its seam ([`Price::limit`]). Rounds over all open pieces, in
 /// parallel; a piece is split into two or more of fewer polygons, so there are at most as many rounds
 /// as polygons, and in practice some ten. `done` is told the faces of each chart as it is accepted.
 /// Charts come sorted by lowest face.
 pub(crate) fn divide(
     patches: Vec<Patch>,
+    price: &Price,
     settings: &Settings,
     done: &(dyn Fn(f64) + Sync),
     run: &Run<'_>,
@@ -71,7 +73,7 @@ pub(crate) fn divide(
         || (),
         |piece, ()| {
             let mut rungs = Rungs::default();
-            let outcome = step(piece, settings, &mut rungs, run)?;
+            let outcome = step(piece, price, settings, &mut rungs, run)?;
             let refused = match &outcome {
                 Outcome::Made(_) => {
                     done(piece.patch.faces.len() as f64);
@@ -93,12 +95,14 @@ pub(crate) fn divide(
 
 fn step(
     piece: &Piece,
+    price: &Price,
     settings: &Settings,
     rungs: &mut Rungs,
     run: &Run<'_>,
 ) -> Result<Outcome<Chart, Piece>, Cancelled> {
     run.progress.check()?;
     let (patch, splits) = (&piece.patch, piece.splits);
+    let settings = &Settings { stretch_limit: price.limit(patch, settings), ..settings.clone() };
     let measured = Measured::new(patch, piece.inherited.as_ref(), settings, run);
     let attempt = Attempt::new(&measured, settings, run);
     if patch.is_one_polygon() {

@@ -15,8 +15,6 @@ pub(super) enum MoveKind {
     JoinAnew,
     /// Two charts are glued along a part of a run.
     PartialJoin,
-    /// A chart is opened from where it bulges.
-    Slit,
     /// A cut in a chart is closed from its end on.
     Zip,
 }

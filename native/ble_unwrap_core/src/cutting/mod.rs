@@ -40,6 +40,7 @@ use atlas_limit::join_within_atlas;
 use charted::Charted;
 use moves::across::cut_across;
 
+pub(crate) use cost::Price;
 pub(crate) use divide::divide;
 
 /// The charts of a component, and how they came about.

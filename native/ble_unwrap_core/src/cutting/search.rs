@@ -61,7 +61,7 @@ pub(super) fn search(
 fn rung_of(kind: MoveKind) -> Rung {
     match kind {
         MoveKind::Join | MoveKind::JoinAnew => Rung::Merge,
-        MoveKind::PartialJoin | MoveKind::Slit => Rung::Dart,
+        MoveKind::PartialJoin => Rung::Dart,
         MoveKind::Zip => Rung::Zip,
     }
 }

@@ -5,7 +5,7 @@ use nalgebra::Point2;
 use crate::cache::Run;
 use crate::charts::{Chart, Patch};
 use crate::distortion::RestTriangle;
-use crate::flattening::{self, NEGLIGIBLE, Polished, Positions, Rung, Rungs};
+use crate::flattening::{self, NEGLIGIBLE, Polished, Positions, Rungs};
 use crate::mesh::FaceId;
 use crate::progress::Cancelled;
 use crate::settings::{Holes, Settings};
@@ -39,7 +39,6 @@ pub(super) fn trial(
         Start::Glued(moved) => glued(cutting, proposal, *moved, settings, rungs, run),
         Start::Redrawn(anew) => Ok(redrawn(cutting, proposal, anew, settings)),
         Start::Lying => parts(cutting, proposal, settings, rungs, run),
-        Start::Opened => opened(cutting, proposal, settings, rungs, run),
         Start::Anew => made_anew(cutting, proposal, settings, rungs, run),
     }
 }
@@ -95,28 +94,6 @@ fn made_anew(
     let seams = |chart: &Chart| chart.patch.mesh.boundary_length();
     let shorter = chart.filter(|chart| seams(chart) <= before.iter().map(|chart| seams(chart)).sum());
     Ok(shorter.map_or(Verdict::Refused, |chart| Verdict::Charts(vec![chart])))
-}
-
-/// Charts that have been opened, minimised from where they lie.
-fn opened(
-    cutting: &Cutting<'_>,
-    proposal: &Proposal,
-    settings: &Settings,
-    rungs: &mut Rungs,
-    run: &Run<'_>,
-) -> Result<Verdict, Cancelled> {
-    let mut charts = Vec::new();
-    for patch in proposal.edit.patches(cutting) {
-        if !may_be_chart(&patch, settings) {
-            return Ok(Verdict::Refused);
-        }
-        let start = positions(cutting, &patch, &[]);
-        match flattening::polish(&patch, &start, Rung::Prolonged, settings, rungs, run)? {
-            Polished::Flat(flat) => charts.push(flat.into_chart(patch)),
-            Polished::Refused | Polished::BadStart => return Ok(Verdict::Refused),
-        }
-    }
-    Ok(Verdict::Charts(charts))
 }
 
 /// Parts of charts, where they lie if that is under the limit of single charts, and else minimised.

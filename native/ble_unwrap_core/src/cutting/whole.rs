@@ -13,7 +13,6 @@ use super::history::History;
 use super::moves::Move;
 use super::moves::join::{self, Which};
 use super::moves::partial_join::PartialJoin;
-use super::moves::slit::Slit;
 use super::moves::zip::Zip;
 use super::search::search;
 use super::state::Cutting;
@@ -34,8 +33,8 @@ impl Whole<'_> {
         Patch::cut_out(&self.patch.mesh, &self.patch.polygon, faces.to_vec(), is_cut)
     }
 
-    /// Charts patches that make up this mesh, joins charts that need not be apart, and opens them where that is worth it. `done`
-    /// is told the faces of each chart that is made.
+    /// Charts patches that make up this mesh, and joins charts that need not be apart. `done` is told the
+    /// faces of each chart that is made.
     pub(super) fn charts(
         &self,
         patches: Vec<Patch>,
@@ -44,11 +43,10 @@ impl Whole<'_> {
         done: &(dyn Fn(f64) + Sync),
         run: &Run<'_>,
     ) -> Result<Vec<Chart>, Cancelled> {
-        let charting = divide::divide(patches, settings, done, run)?;
+        let price = Price::new(&self.patch.mesh, settings);
+        let charting = divide::divide(patches, &price, settings, done, run)?;
         rungs.add(&charting.rungs);
-        let charts = self.join(charting, Which::All, settings, rungs, run)?;
-        let slit = Slit { price: Price::new(&self.patch.mesh, settings) };
-        self.search(charts, &[&slit], settings, rungs, run)
+        self.join(charting, Which::All, settings, rungs, run)
     }
 
     /// Joins charts of this mesh along their borders, where that is wanted.
@@ -66,8 +64,18 @@ impl Whole<'_> {
         join::join(&self.patch.mesh, &self.patch.polygon, charting, which, settings, rungs, run)
     }
 
-    /// Joins charts of this mesh along parts of their borders, and closes cuts from their ends on. No face changes its chart but by
-    /// a join.
+    /// Joins charts of this mesh along parts of their borders, if all moves are wanted.
+    pub(super) fn join_partly(
+        &self,
+        charts: Vec<Chart>,
+        settings: &Settings,
+        rungs: &mut Rungs,
+        run: &Run<'_>,
+    ) -> Result<Vec<Chart>, Cancelled> {
+        self.search(charts, &[&PartialJoin], settings, rungs, run)
+    }
+
+    /// Closes cuts of charts of this mesh from their ends on, if all moves are wanted.
     pub(super) fn close(
         &self,
         charts: Vec<Chart>,
@@ -75,7 +83,7 @@ impl Whole<'_> {
         rungs: &mut Rungs,
         run: &Run<'_>,
     ) -> Result<Vec<Chart>, Cancelled> {
-        self.search(charts, &[&PartialJoin, &Zip { limit: settings.stretch_limit }], settings, rungs, run)
+        self.search(charts, &[&Zip { limit: settings.stretch_limit }], settings, rungs, run)
     }
 
     /// Makes moves on charts of this mesh, if all moves are wanted.

@@ -4,11 +4,12 @@ use std::collections::BTreeSet;
 
 use crate::cache::Run;
 use crate::charts::{Chart, Patch};
+use crate::cutting::{self, Price};
 use crate::flattening::{self, Rung, Rungs};
 use crate::mesh::{FaceId, Surface};
 use crate::progress::Cancelled;
+use crate::segmentation;
 use crate::settings::Settings;
-use crate::{cutting, segmentation};
 
 /// From this round on a faulty chart comes apart into single polygons, which always do.
 const LAST_RESORT: usize = 9;
@@ -79,7 +80,7 @@ pub(super) fn mend(
             }
         }
     }
-    let redone = cutting::divide(again, settings, &|_| (), run)?;
+    let redone = cutting::divide(again, &Price::new(&surface.mesh, settings), settings, &|_| (), run)?;
     rungs.add(&redone.rungs);
     kept.extend(redone.charts);
     kept.sort_by_key(|c| c.patch.faces.iter().min().copied());

@@ -30,7 +30,7 @@ const PAPER_TOGETHER_MAX: usize = 2_000;
 pub(crate) const MOST_TOGETHER: usize = 20_000;
 
 /// The default of [`Settings::stretch_price`].
-const DEFAULT_STRETCH_PRICE: f64 = 0.0;
+const DEFAULT_STRETCH_PRICE: f64 = 20.0;
 
 /// What happens to the holes of a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -63,10 +63,10 @@ class _CallSettings(TypedDict, total=False):
 class _ChartsGroup(TypedDict, total=False):
     limit_over: Literal["chart", "atlas"]
     """What the limit bounds. "chart": No chart is stretched beyond the limit. "atlas": All charts together keep the limit, while some exceed it, up to fourfold above 1: fewer charts."""
-    merge: bool
-    """Joins neighbouring charts again where their union stays within the stretch limit."""
-    least_sewn: float
-    """Two charts are sewn along a part of their border, the rest of which stays open as a dart, if that part is at least this long beside the width of the smaller one. Less gives fewer charts, more gives compact ones, the most makes no darts."""
+    stretch_price: float
+    """How much more seam less stretch is worth: the length of seam for an excess of 1 of the squared stretch. 0 makes seams as short as the limit allows; more gives less stretch and more charts."""
+    moves: Literal["split", "join", "all"]
+    """What the search for charts may do. "split": Patches are split until they keep the stretch limit. "join": Neighbouring charts are joined again where they keep the limit together. "all": Charts may be cut open, unfolded and joined along a part of their border, too."""
     holes: Literal["keep", "cut"]
     """What happens to charts with holes. "keep": A chart may have holes, and other charts may be packed into them. "cut": Every chart is cut open to a disk."""
     chart_scale: Literal["uniform", "stretch"]

@@ -17,6 +17,7 @@ use crate::rounds::{self, Outcome};
 use crate::segmentation::{self, Segmentation};
 use crate::settings::{Moves, Settings};
 
+use super::cost::Price;
 use super::divide::{self, Charting};
 use super::moves::dart;
 use super::whole::Whole;
@@ -31,6 +32,8 @@ const COARSE_VERTICES: (usize, usize) = (1_500, 20_000);
 /// On the coarse mesh the stretch above 1 must stay under this share of what the limit allows: detail
 /// that the collapse removed adds some.
 const COARSE_ALLOWANCE: f64 = 0.6;
+/// The same where cuts are closed.
+const COARSE_ALLOWANCE_TO_CLOSE: f64 = 0.9;
 /// A flattening there only has to tell whether the limit is kept, and where to begin: it may end so many times sooner.
 const COARSE_TOLERANCE: f64 = 10.0;
 /// Sides by which a border may move on the fine mesh: about two edges of the coarse one at the usual
@@ -54,16 +57,22 @@ pub(super) struct Part {
     guide: Chart,
     /// The number of the guide among all, where it has not been joined.
     number: Option<usize>,
-    /// What it was joined of, to go back to.
+    /// What it was joined of, or what it was before its cuts were closed further: to go back to.
     pieces: Vec<Part>,
 }
 
 impl Part {
-    /// Whether an edge of the coarse mesh lies between two of the pieces that the guide was joined of.
+    /// Whether an edge of the coarse mesh lies between two of the charts that the guide was joined of.
     fn is_border(&self, coarse: &TriMesh, h: HalfedgeId) -> bool {
-        let piece =
-            |h: HalfedgeId| self.pieces.iter().position(|p| p.guide.patch.faces.binary_search(&h.face()).is_ok());
-        !self.pieces.is_empty() && piece(h) != piece(coarse.twin(h))
+        match &self.pieces[..] {
+            [] => false,
+            [before] => before.is_border(coarse, h),
+            pieces => {
+                let piece =
+                    |h: HalfedgeId| pieces.iter().position(|p| p.guide.patch.faces.binary_search(&h.face()).is_ok());
+                piece(h) != piece(coarse.twin(h))
+            }
+        }
     }
 }
 
@@ -81,8 +90,10 @@ pub(super) struct OnCoarse<'a> {
     whole: Patch,
     coarse: Arc<Coarse>,
     settings: &'a Settings,
-    /// For the coarse mesh.
+    /// For the coarse mesh, where a part over the limit would have to be split.
     strict: Settings,
+    /// For the coarse mesh, where a part over the limit goes back to what it was.
+    less_strict: Settings,
 }
 
 impl<'a> OnCoarse<'a> {
@@ -99,10 +110,13 @@ impl<'a> OnCoarse<'a> {
             run.recall(Kind::Coarse, input, bytes, || mesh::coarsen(&fine.patch.mesh, target, run.progress))?;
         let polygon = (0..coarse.mesh.face_count()).map(|f| FaceId::new(f).index() as u32).collect();
         let whole = Patch::whole(Arc::new(coarse.mesh.clone()), polygon);
-        let mut strict = settings.clone();
-        strict.stretch_limit = 1.0 + COARSE_ALLOWANCE * (settings.stretch_limit - 1.0);
-        strict.stretch.tolerance *= COARSE_TOLERANCE;
-        Ok(Self { fine, whole, coarse, settings, strict })
+        let [strict, less_strict] = [COARSE_ALLOWANCE, COARSE_ALLOWANCE_TO_CLOSE].map(|allowance| {
+            let mut of_coarse = settings.clone();
+            of_coarse.stretch_limit = 1.0 + allowance * (settings.stretch_limit - 1.0);
+            of_coarse.stretch.tolerance *= COARSE_TOLERANCE;
+            of_coarse
+        });
+        Ok(Self { fine, whole, coarse, settings, strict, less_strict })
     }
 
     /// Parts that flatten under the limit on the coarse mesh.
@@ -114,13 +128,16 @@ impl<'a> OnCoarse<'a> {
         for (i, chart) in charts.iter().enumerate() {
             chart.patch.faces.iter().for_each(|f| number[f.index()] = Some(i));
         }
-        let joined = whole.close(charts, &self.strict, rungs, run)?;
-        Ok(self.join(parts, joined, &number))
+        let joined = whole.join_partly(charts, &self.strict, rungs, run)?;
+        let parts = self.join(parts, &joined, &number);
+        // From too far there is a way back.
+        let closed = whole.close(joined, &self.less_strict, rungs, run)?;
+        Ok(self.close(parts, closed))
     }
 
     /// Puts parts together whose guides have been joined, cut where these are open. `number` says which guide each face of the
     /// coarse mesh was in.
-    fn join(&self, parts: Vec<Part>, charts: Vec<Chart>, number: &[Option<usize>]) -> Vec<Part> {
+    fn join(&self, parts: Vec<Part>, charts: &[Chart], number: &[Option<usize>]) -> Vec<Part> {
         let mut rest: Vec<Option<Part>> = parts.into_iter().map(Some).collect();
         let mut joined = Vec::new();
         for chart in charts {
@@ -134,18 +151,42 @@ impl<'a> OnCoarse<'a> {
                 continue;
             }
             let pieces: Vec<Part> = rest.iter_mut().filter(|p| is_mine(p)).filter_map(Option::take).collect();
-            let borders: Vec<(&[FaceId], &Chart)> = pieces.iter().map(|p| (&*p.faces, &p.guide)).collect();
-            match carried_over(&self.coarse.mesh, &self.fine.patch.mesh, &borders, &chart) {
+            match self.cuts_of(&pieces, chart) {
                 Some(cuts) => {
                     let mut faces: Vec<FaceId> = pieces.iter().flat_map(|p| p.faces.iter().copied()).collect();
                     faces.sort_unstable();
-                    joined.push(Part { faces, cuts, guide: chart, number: None, pieces });
+                    joined.push(Part { faces, cuts, guide: chart.clone(), number: None, pieces });
                 }
                 None => joined.extend(pieces),
             }
         }
         joined.extend(rest.into_iter().flatten());
         joined
+    }
+
+    /// Where the union of pieces is cut whose guides have become a chart; `None` where they do not hang together.
+    fn cuts_of(&self, pieces: &[Part], chart: &Chart) -> Option<Vec<HalfedgeId>> {
+        let borders: Vec<(&[FaceId], &Chart)> = pieces.iter().map(|p| (&*p.faces, &p.guide)).collect();
+        carried_over(&self.coarse.mesh, &self.fine.patch.mesh, &borders, chart)
+    }
+
+    /// Gives parts whose guides have had cuts closed these as they are now.
+    fn close(&self, parts: Vec<Part>, charts: Vec<Chart>) -> Vec<Part> {
+        let border = |chart: &Chart| chart.patch.mesh.boundary_length();
+        let close = |part: Part| {
+            let same = |chart: &&Chart| chart.patch.faces == part.guide.patch.faces;
+            let Some(guide) = charts.iter().find(same).filter(|chart| border(chart) < border(&part.guide)) else {
+                return part;
+            };
+            let cuts = if part.pieces.is_empty() { Some(Vec::new()) } else { self.cuts_of(&part.pieces, guide) };
+            match cuts {
+                Some(cuts) => {
+                    Part { faces: part.faces.clone(), cuts, guide: guide.clone(), number: None, pieces: vec![part] }
+                }
+                None => part,
+            }
+        };
+        parts.into_iter().map(close).collect()
     }
 
     /// Divides a patch of the fine mesh as the coarse charts it lies on are divided.
@@ -218,7 +259,8 @@ impl<'a> OnCoarse<'a> {
             }
         }
         let split_count = rounds.divisions;
-        let charting = divide::divide(rest, self.settings, done, run)?;
+        let charting =
+            divide::divide(rest, &Price::new(&self.fine.patch.mesh, self.settings), self.settings, done, run)?;
         // What is charted anew has not been tried with its neighbours on the coarse mesh either.
         let alone = split_count + charting.family.iter().flatten().max().map_or(0, |most| most + 1);
         let family = (alone..).zip(charting.family).map(|(own, f)| Some(f.map_or(own, |f| f + split_count)));
@@ -254,7 +296,8 @@ impl<'a> OnCoarse<'a> {
         faces.sort_unstable();
         let patch = Patch::of_surface(&self.whole.mesh, &self.whole.polygon, faces);
         let patches = divide::split_once(&patch, &self.strict, rungs, run)?;
-        let charting = divide::divide(patches, &self.strict, &|_| (), run)?;
+        let charting =
+            divide::divide(patches, &Price::new(&self.whole.mesh, &self.strict), &self.strict, &|_| (), run)?;
         rungs.add(&charting.rungs);
         let patch = on_fine();
         let parts = self.prolong_labels(&patch, &charting.charts, run)?;

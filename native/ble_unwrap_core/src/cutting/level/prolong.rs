@@ -11,10 +11,13 @@ use std::collections::{BinaryHeap, HashMap};
 use nalgebra::{Point2, Point3};
 
 use crate::charts::{Chart, Patch};
+use crate::collections::DisjointSets;
 use crate::mesh::{Coarse, FaceId, HalfedgeId, TriMesh, VertexId};
 
 /// A fine cut replaces a coarse edge; it is looked for this many edge lengths around.
 const LONGEST_DETOUR: f64 = 3.0;
+/// Cuts are mended so many times at most. They need it where paths on the fine mesh run side by side, mostly once or twice.
+const MOST_REPAIRS: usize = 16;
 /// Outside its coarse face a vertex is placed by linear extrapolation, up to this barycentric coordinate below
 /// zero: borders move by about two coarse edges, and further out the plane of a face says nothing.
 const FURTHEST_OUTSIDE: f64 = 2.0;
@@ -99,13 +102,69 @@ fn fine_cuts(coarse: &Coarse, part: &Patch, cuts: &CoarseCuts) -> Vec<HalfedgeId
         longest = longest.max(length);
         // An end that the border has left behind: the cut then ends on the border.
         if let (Some(from), to) | (to, Some(from)) = (fine(a), fine(b)) {
-            paths.push(path(part, from, to, LONGEST_DETOUR * length));
+            paths.push(path_between(part, from, to, LONGEST_DETOUR * length));
         }
     }
     let landings = cuts.landings.iter().filter_map(|&v| fine(v));
-    paths.extend(landings.map(|from| path(part, from, None, LONGEST_DETOUR * longest)));
+    paths.extend(landings.map(|from| path_between(part, from, None, LONGEST_DETOUR * longest)));
     let tips: Vec<VertexId> = cuts.tips.iter().filter_map(|&v| fine(v)).collect();
-    without_stubs(&part.mesh, paths.concat(), &tips)
+    repaired(part, without_stubs(&part.mesh, paths.concat(), &tips), &tips, LONGEST_DETOUR * longest)
+}
+
+/// Cuts that leave the part in one piece and hang together with its border, as the coarse ones do. Two paths that run side by side
+/// enclose a few faces, and a path that was not found leaves what is behind it a hole: an edge is left out there, or a path put in,
+/// no longer than `reach`.
+fn repaired(part: &Patch, mut edges: Vec<HalfedgeId>, tips: &[VertexId], reach: f64) -> Vec<HalfedgeId> {
+    let mesh = &part.mesh;
+    for _ in 0..MOST_REPAIRS {
+        let (label, count) = part.cut(&edges).mesh.components();
+        if count > 1 {
+            let mut size = vec![0usize; count];
+            label.iter().for_each(|&l| size[l as usize] += 1);
+            let smallest = (0..count).min_by_key(|&l| size[l]);
+            let of = |h: HalfedgeId| label[h.face().index()] as usize;
+            let is_way_out = |h: &HalfedgeId| {
+                if mesh.is_boundary(*h) {
+                    return false;
+                }
+                let [a, b] = [of(*h), of(mesh.twin(*h))];
+                a != b && (Some(a) == smallest || Some(b) == smallest)
+            };
+            // The rest of that side is a stub then.
+            let Some(at) = edges.iter().position(is_way_out) else { return edges };
+            edges.remove(at);
+            edges = without_stubs(mesh, edges, tips);
+        } else if let Some(way) = way_to_border(part, &edges, reach) {
+            edges.extend(way);
+            edges = without_stubs(mesh, edges, tips);
+        } else {
+            break;
+        }
+    }
+    edges
+}
+
+/// The shortest way from cuts that do not hang together with the border to this or to others that do; `None` where all do, or where
+/// none is found.
+fn way_to_border(part: &Patch, edges: &[HalfedgeId], reach: f64) -> Option<Vec<HalfedgeId>> {
+    let mesh = &part.mesh;
+    let ends = |h: HalfedgeId| [mesh.from(h), mesh.to(h)];
+    let mut together = DisjointSets::new(mesh.vertex_count());
+    edges.iter().map(|&h| ends(h)).for_each(|[a, b]| {
+        together.join(a.index(), b.index());
+    });
+    let cut = together.labels().0;
+    let on_cuts = || edges.iter().flat_map(|&h| ends(h));
+    let mut landed: Vec<u32> = on_cuts().filter(|&v| mesh.is_boundary_vertex(v)).map(|v| cut[v.index()]).collect();
+    landed.sort_unstable();
+    let is_landed = |v: VertexId| mesh.is_boundary_vertex(v) || landed.binary_search(&cut[v.index()]).is_ok();
+    let mut adrift: Vec<VertexId> = on_cuts().filter(|&v| !is_landed(v)).collect();
+    adrift.sort_unstable();
+    adrift.dedup();
+    let first = cut[adrift.first()?.index()];
+    adrift.retain(|v| cut[v.index()] == first);
+    let way = path(part, &adrift, is_landed, reach);
+    (!way.is_empty()).then_some(way)
 }
 
 /// Leaves out edges that lead nowhere, neither to the border nor to the tip of a dart: two paths that meet in a vertex may have run on together, and the sides of a slit
@@ -131,12 +190,17 @@ fn without_stubs(mesh: &TriMesh, mut edges: Vec<HalfedgeId>, tips: &[VertexId]) 
 
 /// The shortest path along edges, none of them inside a polygon, from one vertex to another, or to any on the border;
 /// empty where there is none within reach.
-fn path(part: &Patch, from: VertexId, to: Option<VertexId>, reach: f64) -> Vec<HalfedgeId> {
+fn path_between(part: &Patch, from: VertexId, to: Option<VertexId>, reach: f64) -> Vec<HalfedgeId> {
+    path(part, &[from], |v| to.map_or_else(|| part.mesh.is_boundary_vertex(v), |to| v == to), reach)
+}
+
+/// The shortest path along edges, none of them inside a polygon, from any of some vertices to one for which `arrived` holds; empty
+/// where there is none within reach.
+fn path(part: &Patch, from: &[VertexId], arrived: impl Fn(VertexId) -> bool, reach: f64) -> Vec<HalfedgeId> {
     let mesh = &part.mesh;
-    let arrived = |v: VertexId| to.map_or_else(|| mesh.is_boundary_vertex(v), |to| v == to);
-    let mut best: HashMap<VertexId, (f64, HalfedgeId)> = HashMap::from([(from, (0.0, HalfedgeId::NONE))]);
+    let mut best: HashMap<VertexId, (f64, HalfedgeId)> = from.iter().map(|&v| (v, (0.0, HalfedgeId::NONE))).collect();
     // Lengths are not negative, so their bits are in their order.
-    let mut queue = BinaryHeap::from([Reverse((0u64, from))]);
+    let mut queue: BinaryHeap<Reverse<(u64, VertexId)>> = from.iter().map(|&v| Reverse((0, v))).collect();
     while let Some(Reverse((bits, v))) = queue.pop() {
         let distance = f64::from_bits(bits);
         if best[&v].0 < distance {
@@ -300,7 +364,7 @@ mod tests {
         let coarse = mesh::coarsen(&fine, 120, &Progress::new()).expect("not cancelled");
         let uncut = whole(&coarse.mesh);
         let tip = nearest(&coarse.mesh, 0.4, 0.5);
-        let dart = path(&uncut, tip, None, 1.0);
+        let dart = path_between(&uncut, tip, None, 1.0);
         assert!(dart.len() > 1, "from the middle to the border");
         let patch = uncut.cut(&dart);
         assert_eq!(slit(&patch, tip), (dart.len(), true));
@@ -330,8 +394,8 @@ mod tests {
         let mesh = test_surfaces::grid(8, 8, [8.0, 8.0], 0.0);
         let part = whole(&mesh);
         let at = |x, y| nearest(&mesh, x, y);
-        let main = path(&part, at(5.0, 3.0), Some(at(0.0, 3.0)), 9.0);
-        let stub = path(&part, at(3.0, 3.0), Some(at(3.0, 6.0)), 9.0);
+        let main = path_between(&part, at(5.0, 3.0), Some(at(0.0, 3.0)), 9.0);
+        let stub = path_between(&part, at(3.0, 3.0), Some(at(3.0, 6.0)), 9.0);
         assert_eq!((main.len(), stub.len()), (5, 3));
         let mut kept = without_stubs(&mesh, [main.clone(), main.clone()].concat(), &[at(5.0, 3.0)]);
         kept.sort_unstable();
@@ -340,7 +404,7 @@ mod tests {
         assert_eq!(without_stubs(&mesh, branched.clone(), &[at(5.0, 3.0)]), kept, "a branch without a tip goes");
         assert_eq!(without_stubs(&mesh, branched.clone(), &[at(5.0, 3.0), at(3.0, 6.0)]).len(), 8, "two darts");
         assert!(without_stubs(&mesh, branched, &[]).is_empty());
-        let across = path(&part, at(0.0, 3.0), Some(at(8.0, 3.0)), 9.0);
+        let across = path_between(&part, at(0.0, 3.0), Some(at(8.0, 3.0)), 9.0);
         assert_eq!(without_stubs(&mesh, across, &[]).len(), 8, "from border to border");
     }
 }

@@ -87,12 +87,7 @@ impl<'a> Bulging<'a> {
 
     /// The patch cut from its tip to the boundary, or on a closed surface to its root.
     fn with_dart(&self) -> Option<Patch> {
-        Some(self.patch.cut(&self.dart()?))
-    }
-
-    /// The edges from its tip to the boundary, or on a closed surface to its root.
-    pub(crate) fn dart(&self) -> Option<Vec<HalfedgeId>> {
-        path_to(&self.patch, self.bulge.enclosed.or(self.bulge.tip)?, self.bulge.root)
+        cut_to(&self.patch, self.bulge.enclosed.or(self.bulge.tip)?, self.bulge.root)
     }
 }
 
@@ -124,17 +119,12 @@ pub(super) fn is_guided(patch: &Patch) -> bool {
 
 /// A patch cut from an inner vertex to the boundary, or on a closed surface to its root.
 pub(super) fn cut_to(patch: &Patch, tip: VertexId, root: Option<VertexId>) -> Option<Patch> {
-    Some(patch.cut(&path_to(patch, tip, root)?))
-}
-
-/// The shortest way from an inner vertex to the boundary, or on a closed surface to its root.
-fn path_to(patch: &Patch, tip: VertexId, root: Option<VertexId>) -> Option<Vec<HalfedgeId>> {
     let mesh = &patch.mesh;
     let length = |h: HalfedgeId| mesh.edge_length(h) * mesh.border_cost(h);
-    let path = charts::shortest_path_to_boundary(mesh, tip, root, length, |h| patch.is_diagonal(h))?;
+    let dart = charts::shortest_path_to_boundary(mesh, tip, root, length, |h| patch.is_diagonal(h))?;
     // One edge of a closed surface, cut, opens nothing.
     let least = if root.is_some() { 2 } else { 1 };
-    (path.len() >= least).then_some(path)
+    (dart.len() >= least).then(|| patch.cut(&dart))
 }
 
 #[cfg(test)]

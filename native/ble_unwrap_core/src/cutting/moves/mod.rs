@@ -1,7 +1,7 @@
 //! What may be changed about a cutting. A move looks at the cutting and proposes edits; it flattens nothing itself.
 //!
 //! Moves on a patch that has no map to the plane yet say where to cut it: [`split`], [`dart`], [`net`]. Moves on charts make
-//! fewer or better ones of them: [`join`], [`partial_join`], [`zip`], [`slit`], [`hand_over`], [`across`].
+//! fewer or better ones of them: [`join`], [`partial_join`], [`zip`], [`hand_over`], [`across`].
 
 pub(super) mod across;
 pub(super) mod dart;
@@ -9,7 +9,6 @@ pub(super) mod hand_over;
 pub(super) mod join;
 pub(super) mod net;
 pub(super) mod partial_join;
-pub(super) mod slit;
 pub(super) mod split;
 pub(super) mod zip;
 
@@ -40,8 +39,6 @@ pub(super) enum Start {
     Redrawn(Vec<(FaceId, Corners)>),
     /// Where its faces lie now, and they may stay there if they are under the limit.
     Lying,
-    /// Where its faces lie now, but what has been opened is given room.
-    Opened,
     /// Wherever an embedding puts it: it is made one chart from nothing, cut anew as its topology asks for.
     Anew,
 }
