@@ -78,7 +78,9 @@ pub(super) fn charts(
         fine.merge(charting, Which::AfterSplits { most_faces: FINE_UNION }, settings, &mut rungs, progress)?
     } else {
         let patches = unrolling.unwrap_or_else(|| vec![whole.clone()]);
-        let charts = fine.charts(patches, settings, &mut rungs, &|faces| tally.add(faces, 1.0), progress)?;
+        // A large union is as costly to embed whether or not its parts unroll.
+        let which = if is_large { Which::AllSewn { most_faces: FINE_UNION } } else { Which::All };
+        let charts = fine.charts(patches, which, settings, &mut rungs, &|faces| tally.add(faces, 1.0), progress)?;
         fine.sew(charts, settings, &mut rungs, progress)?.into_iter().map(|sewn| sewn.chart).collect()
     };
     charts = recut(&whole.mesh, &whole.polygon, charts, settings, &mut rungs, progress)?;
@@ -108,6 +110,7 @@ impl Whole<'_> {
     fn charts(
         &self,
         patches: Vec<Patch>,
+        which: Which,
         settings: &Settings,
         rungs: &mut Rungs,
         done: &(dyn Fn(f64) + Sync),
@@ -115,7 +118,7 @@ impl Whole<'_> {
     ) -> Result<Vec<Chart>, Cancelled> {
         let charting = charting::chart(patches, settings, done, progress)?;
         rungs.add(&charting.rungs);
-        self.merge(charting, Which::All, settings, rungs, progress)
+        self.merge(charting, which, settings, rungs, progress)
     }
 
     /// Sews charts of this mesh together.
@@ -213,7 +216,7 @@ impl<'a> OnCoarse<'a> {
     /// Parts that flatten under the limit on the coarse mesh.
     fn parts(&self, rungs: &mut Rungs, progress: &Run<'_>) -> Result<Vec<Part>, Cancelled> {
         let whole = Whole { patch: &self.whole };
-        let charts = whole.charts(vec![self.whole.clone()], &self.strict, rungs, &|_| (), progress)?;
+        let charts = whole.charts(vec![self.whole.clone()], Which::All, &self.strict, rungs, &|_| (), progress)?;
         let parts = self.prolong_labels(self.fine.patch, &charts, progress)?;
         let sewn = whole.sew(charts, &self.strict, rungs, progress)?;
         Ok(self.join(parts, sewn))

@@ -29,6 +29,11 @@ const EMBEDDED_SHARE: usize = 5;
 pub(super) enum Which {
     /// All.
     All,
+    /// All, but unions embedded anew only where they have so few faces together, as below.
+    AllSewn {
+        /// Most faces of a union that would be sewn if that were limited.
+        most_faces: usize,
+    },
     /// Only those of which one came out of a split, and which have so few faces together.
     AfterSplits {
         /// Most faces of a union.
@@ -207,6 +212,10 @@ fn borders(
     let split = |i: usize| pool[i].as_ref().is_some_and(|c| c.split);
     let wanted = |a: usize, b: usize| match which {
         Which::All => true,
+        Which::AllSewn { most_faces } => match start {
+            Start::Sewn => true,
+            Start::Embedded => faces(a) + faces(b) <= most_faces / EMBEDDED_SHARE,
+        },
         Which::AfterSplits { most_faces } => {
             let most = match start {
                 Start::Sewn => most_faces,
