@@ -1,9 +1,9 @@
 //! Solving with the factor LLᵀ of a sparse matrix: forward with L, backward with its transpose.
 //!
-//! The factor is faer's, in panels: the columns of a *supernode* have the same rows below their triangle, which are stored
-//! as one dense block, column by column. The factors of charts have panels of two to some dozen columns, for which faer's own
-//! solution spends most of its time on dispatch; plain loops over the columns of a panel take a third of that.
-//! Nothing here depends on the width of the processor's vectors: each sum has a fixed number of partial sums.
+//! The factor is faer's, in panels: the columns of a *supernode* have the same rows below their triangle, which are
+//! stored as one dense block, column by column. The factors of charts have panels of two to some dozen columns, for
+//! which faer's own solution spends most of its time on dispatch; plain loops over the columns of a panel take a third
+//! of that. Nothing here depends on the width of the processor's vectors: each sum has a fixed number of partial sums.
 
 use std::ops::{Add, Div, Mul, Sub};
 
