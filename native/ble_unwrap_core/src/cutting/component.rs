@@ -48,7 +48,9 @@ pub(crate) fn charts(
         fine.join(charting, Which::AfterSplits { most_faces: FINE_UNION }, settings, &mut rungs, run)?
     } else {
         let patches = unrolling.unwrap_or_else(|| vec![whole.clone()]);
-        let charts = fine.charts(patches, settings, &mut rungs, &|faces| charted.add(faces, 1.0), run)?;
+        // A large union is as costly to embed whether or not its parts unroll.
+        let which = if is_large { Which::every_on_fine(FINE_UNION) } else { Which::EVERY };
+        let charts = fine.charts(patches, which, settings, &mut rungs, &|faces| charted.add(faces, 1.0), run)?;
         let charts = fine.join_partly(charts, settings, &mut rungs, run)?;
         fine.close(charts, settings, &mut rungs, run)?
     };

@@ -38,6 +38,7 @@ impl Whole<'_> {
     pub(super) fn charts(
         &self,
         patches: Vec<Patch>,
+        which: Which,
         settings: &Settings,
         rungs: &mut Rungs,
         done: &(dyn Fn(f64) + Sync),
@@ -46,7 +47,7 @@ impl Whole<'_> {
         let price = Price::new(&self.patch.mesh, settings);
         let charting = divide::divide(patches, &price, settings, done, run)?;
         rungs.add(&charting.rungs);
-        self.join(charting, Which::All, settings, rungs, run)
+        self.join(charting, which, settings, rungs, run)
     }
 
     /// Joins charts of this mesh along their borders, where that is wanted.

@@ -9,6 +9,7 @@ mod packing_buffers;
 mod sparse;
 mod sparse_pattern;
 mod symmetric;
+mod triangular;
 mod vector_state;
 
 pub(crate) use classical_mds::{Mds, classical_mds, leading_mds};

@@ -6,7 +6,8 @@ use faer::perm::PermRef;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::amd;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky,
 };
 use faer::sparse::{FaerError, SparseColMatRef};
 use faer::traits::RealField;
@@ -15,6 +16,7 @@ use thiserror::Error;
 
 use super::packing_buffers;
 use super::sparse_pattern::SparsePattern;
+use super::triangular::{self, Real};
 use super::vector_state::restore_vector_state;
 use crate::memory::{self, OutOfMemory};
 
@@ -122,7 +124,7 @@ impl RoughCholesky {
         let n = pattern.size();
         let to_factor = StackReq::new::<f32>(pattern.entry_count()).and(factor.refactor_scratch());
         let vectors = StackReq::new::<f64>(n).array(3).and(StackReq::new::<f32>(n));
-        let scratch = buffer(to_factor.or(vectors.and(factor.solve_scratch())))?;
+        let scratch = buffer(to_factor.or(vectors.and(factor.solve_one_scratch())))?;
         Ok(Self { pattern, factor, scratch })
     }
 
@@ -174,7 +176,7 @@ impl RoughCholesky {
             for (c, r) in column.iter_mut().zip(residual.iter()) {
                 *c = *r as f32;
             }
-            self.factor.solve_in_place(&mut column, stack);
+            self.factor.solve_one(&mut column, stack);
             for (i, c) in image.iter_mut().zip(column.iter()) {
                 *i = f64::from(*c);
             }
@@ -253,7 +255,7 @@ struct Factor<T> {
     values: Vec<T>,
 }
 
-impl<T: RealField + Copy + Default> Factor<T> {
+impl<T: RealField + Real> Factor<T> {
     fn analyse(pattern: &SparsePattern, order: Order) -> Result<Self, SparseError> {
         // The 2×2 blocks of a map's Hessian make dense panels even in small charts.
         let params = CholeskySymbolicParams {
@@ -275,6 +277,32 @@ impl<T: RealField + Copy + Default> Factor<T> {
     /// What [`Factor::refactor`] needs of a stack.
     fn refactor_scratch(&self) -> StackReq {
         self.symbolic.factorize_numeric_llt_scratch::<T>(Par::Seq, Spec::default())
+    }
+
+    /// What [`Factor::solve_one`] needs of a stack.
+    fn solve_one_scratch(&self) -> StackReq {
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Supernodal(symbolic) => {
+                let below = triangular::most_below(symbolic);
+                StackReq::new::<T>(self.symbolic.nrows()).and(StackReq::new::<T>(below))
+            }
+            SymbolicCholeskyRaw::Simplicial(_) => self.solve_scratch(),
+        }
+    }
+
+    /// Solves with one right-hand side.
+    fn solve_one(&self, column: &mut [T], stack: &mut MemStack) {
+        let (SymbolicCholeskyRaw::Supernodal(symbolic), Some(order)) = (self.symbolic.raw(), self.symbolic.perm())
+        else {
+            return self.solve_in_place(column, stack);
+        };
+        let order = order.arrays().0;
+        let (mut x, stack) = stack.make_with(order.len(), |i| column[order[i] as usize]);
+        let (mut below, _) = stack.make_with(triangular::most_below(symbolic), |_| T::default());
+        triangular::solve(symbolic, &self.values, &mut x, &mut below);
+        for (&i, x) in order.iter().zip(x.iter()) {
+            column[i as usize] = *x;
+        }
     }
 
     /// What [`Factor::solve_in_place`] needs of a stack.

@@ -20,6 +20,7 @@ use crate::settings::{Moves, Settings};
 use super::cost::Price;
 use super::divide::{self, Charting};
 use super::moves::dart;
+use super::moves::join::Which;
 use super::whole::Whole;
 use carry::carried_over;
 use prolong::{Prolonged, prolong};
@@ -122,7 +123,7 @@ impl<'a> OnCoarse<'a> {
     /// Parts that flatten under the limit on the coarse mesh.
     pub(super) fn parts(&self, rungs: &mut Rungs, run: &Run<'_>) -> Result<Vec<Part>, Cancelled> {
         let whole = Whole { patch: &self.whole };
-        let charts = whole.charts(vec![self.whole.clone()], &self.strict, rungs, &|_| (), run)?;
+        let charts = whole.charts(vec![self.whole.clone()], Which::EVERY, &self.strict, rungs, &|_| (), run)?;
         let parts = self.prolong_labels(self.fine.patch, &charts, run)?;
         let mut number = vec![None; self.coarse.mesh.face_count()];
         for (i, chart) in charts.iter().enumerate() {

@@ -32,8 +32,11 @@ const EMBEDDED_SHARE: usize = 5;
 /// Which neighbours are tried.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Which {
-    /// All.
-    All,
+    /// All; unions are embedded anew only up to so many faces, if there is a bound.
+    All {
+        /// Most faces of a union that is embedded.
+        most_embedded: Option<usize>,
+    },
     /// Only those of which one came out of a split, and which have so few faces together.
     AfterSplits {
         /// Most faces of a union.
@@ -42,20 +45,22 @@ pub(crate) enum Which {
 }
 
 impl Which {
-    fn includes(self, cutting: &Cutting<'_>, history: &History, charts: [ChartId; 2]) -> bool {
-        match self {
-            Self::All => true,
-            Self::AfterSplits { most_faces } => {
-                let faces: usize = charts.iter().map(|&id| cutting.face_count(id)).sum();
-                charts.iter().any(|&id| history.is_from_split(id)) && faces <= most_faces
-            }
-        }
+    /// Every pair, whatever its size.
+    pub(crate) const EVERY: Self = Self::All { most_embedded: None };
+
+    /// Every pair, on a mesh on which large unions are too costly to embed.
+    pub(crate) fn every_on_fine(most_faces: usize) -> Self {
+        Self::All { most_embedded: Some(most_faces / EMBEDDED_SHARE) }
     }
 
-    fn for_embedding(self) -> Self {
+    fn includes(self, cutting: &Cutting<'_>, history: &History, charts: [ChartId; 2], is_embedded: bool) -> bool {
+        let faces: usize = charts.iter().map(|&id| cutting.face_count(id)).sum();
         match self {
-            Self::All => Self::All,
-            Self::AfterSplits { most_faces } => Self::AfterSplits { most_faces: most_faces / EMBEDDED_SHARE },
+            Self::All { most_embedded } => !is_embedded || most_embedded.is_none_or(|most| faces <= most),
+            Self::AfterSplits { most_faces } => {
+                let most = if is_embedded { most_faces / EMBEDDED_SHARE } else { most_faces };
+                charts.iter().any(|&id| history.is_from_split(id)) && faces <= most
+            }
         }
     }
 }
@@ -84,7 +89,7 @@ pub(crate) fn join(
             history.exclude(MoveKind::Join, Place::between(a, b));
         }
     }
-    let moves: [&dyn Move; 2] = [&Join { which }, &JoinAnew { which: which.for_embedding(), refused: &refused }];
+    let moves: [&dyn Move; 2] = [&Join { which }, &JoinAnew { which, refused: &refused }];
     search(&mut cutting, &mut history, &moves, settings, rungs, run)?;
     Ok(cutting.into_charts())
 }
@@ -104,7 +109,7 @@ impl Move for Join {
         sites(cutting, |charts| {
             charts.iter().all(|&id| is_open(id))
                 && history.refusals(MoveKind::Join, Place::between(charts[0], charts[1])) == 0
-                && self.which.includes(cutting, history, charts)
+                && self.which.includes(cutting, history, charts, false)
         })
     }
 
@@ -146,7 +151,7 @@ impl Move for JoinAnew<'_> {
             charts.iter().all(|&id| is_open(id))
                 && history.had_bad_start(MoveKind::Join, Place::between(charts[0], charts[1]))
                 && history.refusals(MoveKind::JoinAnew, Place::between(charts[0], charts[1])) == 0
-                && self.which.includes(cutting, history, charts)
+                && self.which.includes(cutting, history, charts, true)
         })
     }
 
@@ -241,11 +246,11 @@ mod tests {
             assert_eq!(crate::stretch::first_flip(&chart.patch.mesh, &chart.uv), None);
         }
         let cutting = Cutting::new(&mesh, &polygon, charts.clone());
-        let join = Join { which: Which::All };
+        let join = Join { which: Which::EVERY };
         let site = join.sites(&cutting, &History::default(), &Price::new(&mesh, &settings)).pop().expect("neighbours");
         let lying = tried(&cutting, &join, &site, None, &settings, &run).expect("not cancelled").0;
         assert!(matches!(lying, Verdict::BadStart));
-        let (charts, rungs) = merged([None, None], Which::All, &settings);
+        let (charts, rungs) = merged([None, None], Which::EVERY, &settings);
         assert_eq!(charts.len(), 1);
         assert!(charts[0].l2 > 1.0 && charts[0].l2 <= settings.stretch_limit, "{}", charts[0].l2);
         assert_eq!(charts[0].patch.faces.len(), mesh.face_count());
@@ -256,7 +261,7 @@ mod tests {
     #[test]
     fn a_union_over_the_limit_stays_two_whatever_its_start() {
         let tight = Settings { stretch_limit: 1.0005, moves: Moves::Join, ..Settings::default() };
-        assert_eq!(merged([None, None], Which::All, &tight).0.len(), 2);
+        assert_eq!(merged([None, None], Which::EVERY, &tight).0.len(), 2);
     }
 
     #[test]
@@ -270,7 +275,7 @@ mod tests {
         let settings = Settings::default();
         let charting = Charting { charts, family: vec![None, None], rungs: Rungs::default(), refused };
         let mut rungs = Rungs::default();
-        let charts = join(&mesh, &polygon, charting, Which::All, &settings, &mut rungs, &run).expect("not cancelled");
+        let charts = join(&mesh, &polygon, charting, Which::EVERY, &settings, &mut rungs, &run).expect("not cancelled");
         assert_eq!(charts.len(), 2);
     }
 
@@ -295,7 +300,7 @@ mod tests {
         let one = attempt::as_one(&whole, &settings, &mut rungs, &run).expect("not cancelled").expect("with darts");
         assert!(seam(&one) > sides.iter().map(seam).sum());
         let cutting = Cutting::new(&ball, &polygon, sides.to_vec());
-        let (which, none) = (Which::All, Refused::default());
+        let (which, none) = (Which::EVERY, Refused::default());
         let site = Join { which }
             .sites(&cutting, &History::default(), &Price::new(&ball, &settings))
             .pop()
@@ -322,7 +327,7 @@ mod tests {
         let charting = Charting { charts, family, rungs: Rungs::default(), refused: Refused::default() };
         let (progress, mut rungs) = (Progress::new(), Rungs::default());
         let (settings, run) = (Settings::default(), Run::new(&progress, None));
-        join(mesh, &polygon, charting, Which::All, &settings, &mut rungs, &run).expect("not cancelled")
+        join(mesh, &polygon, charting, Which::EVERY, &settings, &mut rungs, &run).expect("not cancelled")
     }
 
     #[test]
