@@ -2,6 +2,9 @@
 
 use std::ops::Range;
 
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
 use crate::mesh::index::{FaceId, HalfedgeId};
 use crate::mesh::tri_mesh::TriMesh;
 
@@ -14,6 +17,8 @@ pub(super) struct Cells<'a> {
     first: Vec<u32>,
     /// The side after each side; none for diagonals.
     next: Vec<HalfedgeId>,
+    /// The area of each cell along its mean normal.
+    area: Vec<Vector3<f64>>,
 }
 
 impl<'a> Cells<'a> {
@@ -48,8 +53,10 @@ impl<'a> Cells<'a> {
             }
             next
         };
-        let next = mesh.halfedges().map(after).collect();
-        Self { mesh, of_face, first, next }
+        let next = (0..mesh.halfedge_count()).into_par_iter().map(|h| after(HalfedgeId::new(h))).collect();
+        let mut cells = Self { mesh, of_face, first, next, area: Vec::new() };
+        cells.area = (0..cells.len()).into_par_iter().map(|cell| cells.area_of(cell)).collect();
+        cells
     }
 
     /// Number of cells.
@@ -93,6 +100,23 @@ impl<'a> Cells<'a> {
         let halfedges = self.faces(cell).flat_map(|f| FaceId::new(f).halfedges());
         let first = halfedges.into_iter().find(|&h| self.is_side(h));
         first.into_iter().flat_map(|first| self.around(first))
+    }
+
+    /// The area of a cell along its mean normal, which is that of its outline, however it is divided.
+    pub(super) fn area_vector(&self, cell: usize) -> Vector3<f64> {
+        self.area[cell]
+    }
+
+    fn area_of(&self, cell: usize) -> Vector3<f64> {
+        let Some(first) = self.sides(cell).next() else { return Vector3::zeros() };
+        let origin = self.mesh.position(self.mesh.from(first));
+        let (mut sum, mut before) = (Vector3::zeros(), Vector3::zeros());
+        for h in self.around(first) {
+            let arm = self.mesh.position(self.mesh.to(h)) - origin;
+            sum += before.cross(&arm) * 0.5;
+            before = arm;
+        }
+        sum
     }
 
     /// How many triangles of its cell meet at the corner that a side leaves: with the cell's other corners, this says how

@@ -1,6 +1,7 @@
 //! What the sides of polygons look like, whatever the pose, the size and the numbers of their mesh.
 
 use nalgebra::{Matrix3, Point3, Vector3};
+use rayon::prelude::*;
 
 use super::cells::Cells;
 use crate::mesh::index::{HalfedgeId, VertexId};
@@ -13,6 +14,9 @@ use crate::random;
 const STEP: f64 = 0.948_683_298e-6;
 /// A component of less area than this share of the square of its extent weighs by its vertices: its area may be rounding.
 const LEAST_AREA: f64 = 1e-10;
+
+/// So many vertices or polygons are coloured by one thread at a time, which takes some 50 µs.
+const TOGETHER: usize = 1024;
 
 /// A colour for each vertex and side, of one component after the other.
 pub(super) struct Colours<'a> {
@@ -33,15 +37,7 @@ impl<'a> Colours<'a> {
     pub(super) fn new(mesh: &'a TriMesh, cells: &'a Cells<'a>, own_triangles: bool) -> Self {
         let mut weight = vec![0.0; mesh.vertex_count()];
         for cell in 0..cells.len() {
-            let at = |h: HalfedgeId| mesh.position(mesh.from(h));
-            let (mut origin, mut before, mut vector, mut corners) = (None, Vector3::zeros(), Vector3::zeros(), 0.0);
-            for h in cells.sides(cell) {
-                let arm = at(h) - *origin.get_or_insert(at(h));
-                vector += before.cross(&arm);
-                before = arm;
-                corners += 1.0;
-            }
-            let share = 0.5 * vector.norm() / corners;
+            let share = cells.area_vector(cell).norm() / (cells.faces(cell).len() + 2) as f64;
             cells.sides(cell).for_each(|h| weight[mesh.from(h).index()] += share);
         }
         Self {
@@ -63,21 +59,29 @@ impl<'a> Colours<'a> {
     /// Colours a component, and returns its size: the distance of its surface from its middle, in the quadratic mean.
     pub(super) fn colour(&mut self, cells: &[u32], vertices: &[VertexId]) -> f64 {
         let form = Form::new(vertices.iter().map(|v| (self.mesh.position(*v), self.weight[v.index()])));
-        for &v in vertices {
-            let [radius, quantities @ ..] = form.quantities(self.mesh.position(v));
-            self.radius[v.index()] = radius;
-            self.vertex[v.index()] = quantities.into_iter().fold(step(radius), |hash, q| joined(hash, step(q)));
+        let look = |v: &VertexId| {
+            let [radius, quantities @ ..] = form.quantities(self.mesh.position(*v));
+            (radius, quantities.into_iter().fold(step(radius), |hash, q| joined(hash, step(q))))
+        };
+        let looks: Vec<(f64, u64)> = vertices.par_iter().with_min_len(TOGETHER).map(look).collect();
+        for (v, look) in vertices.iter().zip(looks) {
+            (self.radius[v.index()], self.vertex[v.index()]) = look;
         }
-        for &cell in cells {
-            let sides = self.cells.faces(cell as usize).len() as u64 + 2;
-            for h in self.cells.sides(cell as usize) {
-                let [from, to] = [self.mesh.from(h), self.mesh.to(h)];
-                let length = self.mesh.edge_length(h) / form.size;
-                let marks = u64::from(self.mesh.is_boundary(h)) + 2 * u64::from(self.mesh.is_guide(h)) + 4 * sides;
-                let division = if self.divided { self.cells.triangles_at(h) } else { 0 };
-                let words = [self.vertex[to.index()], step(length), marks, division];
-                self.side[h.index()] = words.into_iter().fold(self.vertex[from.index()], joined);
-            }
+        let colour = |h: HalfedgeId, sides: usize| {
+            let [from, to] = [self.mesh.from(h), self.mesh.to(h)];
+            let length = self.mesh.edge_length(h) / form.size;
+            let marks = u64::from(self.mesh.is_boundary(h)) + 2 * u64::from(self.mesh.is_guide(h)) + 4 * sides as u64;
+            let division = if self.divided { self.cells.triangles_at(h) } else { 0 };
+            let words = [self.vertex[to.index()], step(length), marks, division];
+            (h, words.into_iter().fold(self.vertex[from.index()], joined))
+        };
+        let of_cell = |&cell: &u32| {
+            let sides = self.cells.faces(cell as usize).len() + 2;
+            self.cells.sides(cell as usize).map(move |h| colour(h, sides))
+        };
+        let coloured: Vec<(HalfedgeId, u64)> = cells.par_iter().with_min_len(TOGETHER).flat_map_iter(of_cell).collect();
+        for (h, colour) in coloured {
+            self.side[h.index()] = colour;
         }
         form.size
     }
@@ -89,7 +93,7 @@ pub(super) fn joined(hash: u64, word: u64) -> u64 {
 }
 
 /// The step that a quantity is nearest to.
-fn step(quantity: f64) -> u64 {
+pub(super) fn step(quantity: f64) -> u64 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, and the bits are hashed")]
     let step = (quantity / STEP).round() as i64 as u64;
     step

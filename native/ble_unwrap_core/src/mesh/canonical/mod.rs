@@ -42,12 +42,12 @@ use traversal::Traversal;
 /// Guaranteed: a surface that was moved, scaled uniformly, renumbered, or whose polygons begin at other corners gives the
 /// same mesh and the same polygons bit for bit, except for the cases below. Components come one after the other, those of
 /// most polygons first, each near the origin in a frame of its own; the unit of length stays. Each vertex is moved by less
-/// than 1e-7 of its component's extent and by less than a thousandth of the smallest feature beside it. What the surface
+/// than 1e-9 of its component's extent and by less than a thousandth of the smallest feature beside it. What the surface
 /// says of the input stays true.
 ///
-/// Not guaranteed: the same form where a coordinate lies within its own rounding of a boundary between two rounded values.
-/// With coordinates that are exact to 1e-15 of the extent, that happens to one of some ten million. Nor where two sides
-/// look the same as far as they are compared but no symmetry leads from one to the other.
+/// Not guaranteed: the same form where a coordinate lies within its own rounding of a boundary between two rounded values;
+/// then it may be one step of 1e-10 of the extent apart. Nor where two sides look the same as far as they are compared but
+/// no symmetry leads from one to the other.
 ///
 /// O(n log n).
 ///
@@ -70,17 +70,19 @@ pub(crate) fn canonical(surface: Surface, progress: &Progress) -> Result<Surface
         let start = traversal.start(&colours, cells, vertices);
         let (order, hash) = traversal.whole(&colours, start);
         placement::place(&mesh, traversal.cells, &order, vertices, &features, size, &mut placed);
-        parts.push(Part { hash, order });
+        parts.push(Part { size: colours::step(size), hash, order });
     }
-    // Components that agree in both look the same, and then their order does not matter.
-    parts.sort_by_key(|part| (Reverse(part.order.len()), part.hash));
+    // Components that agree in all three look the same, and then their order does not matter.
+    parts.sort_by_key(|part| (Reverse(part.order.len()), Reverse(part.size), part.hash));
     let order = parts.iter().flat_map(|part| &part.order);
     assemble(surface, &cells, order, &placed, progress)
 }
 
 /// A component in its new order.
 struct Part {
-    /// Equal for components that look the same.
+    /// In small steps.
+    size: u64,
+    /// Equal for components that look the same but for their size.
     hash: u64,
     /// The side by which each polygon is reached.
     order: Vec<HalfedgeId>,
@@ -218,12 +220,10 @@ impl<'a> Assembly<'a> {
     /// lowest; ascending.
     fn given_triangles(&mut self) {
         let Self { surface, cells, outline, triangles, .. } = self;
-        let mut place: Vec<(u32, u32)> =
-            outline.iter().zip(0..).map(|(h, i)| (surface.corner[h.index()], i)).collect();
+        let mut place: Vec<(u32, u32)> = outline.iter().zip(0..).map(|(h, i)| (surface.corner[h.index()], i)).collect();
         place.sort_unstable();
-        let local = |h: HalfedgeId| {
-            place.binary_search_by_key(&surface.corner[h.index()], |p| p.0).map_or(0, |at| place[at].1)
-        };
+        let local =
+            |h: HalfedgeId| place.binary_search_by_key(&surface.corner[h.index()], |p| p.0).map_or(0, |at| place[at].1);
         for f in cells.faces(cells.of(outline[0])) {
             let [a, b, c] = FaceId::new(f).halfedges().map(local);
             triangles.push(if a < b && a < c {

@@ -7,8 +7,8 @@ use crate::mesh::condition::{ConditionOptions, condition};
 use crate::mesh::input::MeshInput;
 use crate::mesh::measure;
 use ble_unwrap_fixtures::{
-    PolyMesh, capped_cylinder, cone, face_like, genus_plate, ico_sphere, keyhole, moebius, regular_polygon, star_polygon,
-    torus, uv_sphere, voxels,
+    PolyMesh, capped_cylinder, cone, face_like, genus_plate, ico_sphere, keyhole, moebius, regular_polygon,
+    star_polygon, torus, uv_sphere, voxels,
 };
 use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
@@ -150,7 +150,8 @@ fn quads_of_a_grid_are_halved_alike() {
         let t = form.mesh.twin(*h);
         !t.is_none() && form.polygon[t.face().index()] == form.polygon[h.face().index()]
     };
-    let direction = |h: HalfedgeId| (form.mesh.position(form.mesh.to(h)) - form.mesh.position(form.mesh.from(h))).normalize();
+    let direction =
+        |h: HalfedgeId| (form.mesh.position(form.mesh.to(h)) - form.mesh.position(form.mesh.from(h))).normalize();
     let diagonals: Vec<Vector3<f64>> = form.mesh.halfedges().filter(is_diagonal).map(direction).collect();
     assert_eq!(diagonals.len(), 60);
     assert!(diagonals.iter().all(|d| d.dot(&diagonals[0]).abs() > 0.999_999), "all parallel");
