@@ -45,7 +45,7 @@ static ROWS: [Row; 17] = [
     row("capped cylinder", [1, 1], 1.0084, 2.473, 0.486),
     row("cone", [1, 1], 1.0, 0.85, 0.54),
     row("torus", [1, 1], 1.0278, 1.721, 0.436),
-    row("plate with five holes", [2, 2], 1.06, 4.45, 0.60),
+    row("plate with five holes", [2, 2], 1.06, 4.14, 0.60),
     row("Moebius strip", [2, 2], 1.0, 0.617, 0.548),
     row("Klein bottle", [1, 1], 1.0326, 1.729, 0.601),
     row("face", [1, 1], 1.0304, 0.0, 0.779),

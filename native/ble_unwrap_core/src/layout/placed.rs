@@ -1,6 +1,6 @@
 //! Charts packed into the texture and rounded to single precision.
 
-use nalgebra::{Point2, Point3};
+use nalgebra::Point2;
 
 use crate::charts::Chart;
 use crate::error::UnwrapError;
@@ -31,7 +31,7 @@ impl Placed {
     ) -> Result<Self, UnwrapError> {
         let packed = pack(charts, packing, progress)?;
         let size = packed.size.map(f64::from);
-        let rounding = Rounding { texel: size.map(|s| 1.0 / s), diagonal: diagonal(surface) };
+        let rounding = Rounding { texel: size.map(|s| 1.0 / s), diagonal: surface.diagonal };
         let mut layout = Self {
             uv: vec![[0.0; 2]; input.corner_vertices.len()],
             face_chart: vec![-1; surface.mesh.face_count()],
@@ -59,7 +59,7 @@ impl Placed {
             let label = i32::try_from(number).unwrap_or(i32::MAX);
             for (local, &face) in chart.patch.mesh.faces().zip(&chart.patch.faces) {
                 layout.face_chart[face.index()] = label;
-                layout.polygon_chart[surface.polygon[face.index()] as usize] = label;
+                layout.polygon_chart[surface.input_polygon(face)] = label;
                 for (vertex, h) in chart.patch.mesh.triangle(local).iter().zip(face.halfedges()) {
                     layout.uv[surface.corner[h.index()] as usize] = uv[vertex.index()];
                 }
@@ -82,14 +82,4 @@ fn pack(charts: &[Chart], packing: &PackSettings, progress: &Progress) -> Result
     let items: Vec<PackItem<'_>> =
         charts.iter().zip(&triangles).map(|(c, t)| PackItem { points: &c.uv, triangles: t }).collect();
     Ok(packing::pack(&items, packing, progress)?)
-}
-
-fn diagonal(surface: &Surface) -> f64 {
-    let mut low = Point3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY);
-    let mut high = -low;
-    for p in surface.mesh.positions() {
-        low = low.inf(p);
-        high = high.sup(p);
-    }
-    if surface.mesh.vertex_count() == 0 { 0.0 } else { (high - low).norm() }
 }

@@ -8,7 +8,7 @@ use super::collapse::{Collapsed, join_ends};
 use super::defects::Defects;
 use super::frame::Frame;
 use super::glue::{Glued, Sides};
-use super::index::{HalfedgeId, VertexId};
+use super::index::{FaceId, HalfedgeId, VertexId};
 use super::input::{MeshError, MeshInput, Polygons};
 use super::irregular::{count_bow_ties, count_duplicates, count_welded, severed_vertices};
 use super::measure::triangle_area;
@@ -48,8 +48,12 @@ impl Default for ConditionOptions {
 pub(crate) struct Surface {
     /// The mesh, centred on the middle of its box and scaled to unit area (see [`Surface::scale`]).
     pub mesh: Arc<TriMesh>,
-    /// The input polygon of each triangle; ascending.
+    /// The polygon of each triangle; ascending. Numbered as in the input, unless `input_polygon` says otherwise.
     pub polygon: Vec<u32>,
+    /// The input's number of each polygon; empty where they are numbered as there.
+    pub input_polygon: Vec<u32>,
+    /// Whether all polygons were divided into triangles here, so that they may be divided in another way.
+    pub own_triangles: bool,
     /// The input corner of each corner of the mesh.
     pub corner: Vec<u32>,
     /// The input vertex of each vertex of the mesh: of several that are one, any.
@@ -69,6 +73,8 @@ pub(crate) struct Surface {
     /// Length in the input's unit of one unit of the mesh. A surface of less area than 1e-12 of the
     /// square of half its extent has that half for its unit instead.
     pub scale: f64,
+    /// The diagonal of the input's bounding box, in units of the mesh.
+    pub diagonal: f64,
 }
 
 impl Default for Surface {
@@ -77,6 +83,8 @@ impl Default for Surface {
         Self {
             mesh: Arc::default(),
             polygon: Vec::new(),
+            input_polygon: Vec::new(),
+            own_triangles: true,
             corner: Vec::new(),
             vertex: Vec::new(),
             representative: Vec::new(),
@@ -85,11 +93,19 @@ impl Default for Surface {
             unmapped: Vec::new(),
             defects: Defects::default(),
             scale: 1.0,
+            diagonal: 0.0,
         }
     }
 }
 
 impl Surface {
+    /// The input's number of the polygon of a face.
+    #[must_use]
+    pub(crate) fn input_polygon(&self, f: FaceId) -> usize {
+        let polygon = self.polygon[f.index()];
+        self.input_polygon.get(polygon as usize).map_or(polygon, |&input| input) as usize
+    }
+
     /// The vertex of the mesh that each input corner lies at, by corner, ascending; corners of unmapped polygons have none.
     /// O(n log n).
     #[must_use]
@@ -174,7 +190,14 @@ pub(crate) fn condition(
             uncollapsed(surface, collapsed)
         }
     };
-    Ok(Surface { unmapped, representative, scale: (surface.scale * frame.half_extent).min(f64::MAX), ..surface })
+    Ok(Surface {
+        unmapped,
+        representative,
+        own_triangles: input.corner_triangles.is_none(),
+        diagonal: frame.diagonal / surface.scale,
+        scale: (surface.scale * frame.half_extent).min(f64::MAX),
+        ..surface
+    })
 }
 
 /// A surface of collapsed polygons with the numbers of the input.

@@ -2,6 +2,7 @@
 //!
 //! Knows nothing of charts, UVs or stages.
 
+mod canonical;
 mod coarsen;
 mod collapse;
 mod condition;
@@ -24,6 +25,7 @@ mod tri_mesh;
 mod triangulate;
 mod weld;
 
+pub(crate) use canonical::canonical;
 pub(crate) use coarsen::{Coarse, coarsen};
 pub(crate) use condition::{ConditionOptions, Surface, condition};
 pub(crate) use groups::Groups;

@@ -381,6 +381,13 @@ impl TriMesh {
         if self.is_guide(h) { GUIDE_COST } else { 1.0 }
     }
 
+    /// One of the half-edges that leave `v`.
+    #[inline]
+    #[must_use]
+    pub(crate) fn an_outgoing(&self, v: VertexId) -> HalfedgeId {
+        self.outgoing[v.index()]
+    }
+
     /// The half-edges that leave `v`, counter-clockwise; on a boundary from the half-edge without a
     /// twin. The neighbours of `v` are their ends and, on a boundary, the start of the last one's
     /// [`prev`](HalfedgeId::prev).

@@ -62,7 +62,7 @@ pub(super) fn triangulate(
             outline.extend(corners.clone().map(|c| points[polygons.vertex(c)]));
             match *outline {
                 [_, _, _] => local.push([0, 1, 2]),
-                [a, b, c, d] => local.extend(halve_quad([a, b, c, d])),
+                [a, b, c, d] => local.extend(halve_quad([a, b, c, d], Diagonal::FromFirst)),
                 _ => clip_ears(&outline, &mut local, progress)?,
             }
         }
@@ -193,17 +193,31 @@ fn all_sides_once(triangles: &[[u32; 3]], n: u32) -> bool {
     true
 }
 
+/// A diagonal of a quad, by the first corner that it ends at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Diagonal {
+    FromFirst,
+    FromSecond,
+}
+
 /// Halves a quad by the diagonal that leaves no triangle turned over; by the shorter one where both
-/// will do. The first diagonal wins near-ties, so that rounding does not decide for squares.
-fn halve_quad(p: [Point3<f64>; 4]) -> [[u32; 3]; 2] {
+/// will do. The wanted diagonal wins near-ties, so that rounding does not decide for squares.
+pub(super) fn halve_quad(p: [Point3<f64>; 4], wanted: Diagonal) -> [[u32; 3]; 2] {
     const TIE: f64 = 1.0 + 1e-6;
+    // A triangle of less than this share of the quad is turned over or flat, as rounding would have it.
+    const FLAT: f64 = 1e-9;
     // The area vector of a quad is half the cross product of its diagonals, however it is bent.
     let normal = (p[2] - p[0]).cross(&(p[3] - p[1]));
     let upright = |t: [u32; 3]| area_vector(t.map(|i| p[i as usize])).dot(&normal);
     let halves = [[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]];
     let worst = halves.map(|h: [[u32; 3]; 2]| upright(h[0]).min(upright(h[1])));
-    let second = if worst[0] > 0.0 && worst[1] > 0.0 {
-        (p[3] - p[1]).norm_squared() * TIE < (p[2] - p[0]).norm_squared()
+    let least = FLAT * normal.norm_squared();
+    let second = if worst[0] > least && worst[1] > least {
+        let [first, second] = [p[2] - p[0], p[3] - p[1]].map(|d| d.norm_squared());
+        match wanted {
+            Diagonal::FromFirst => second * TIE < first,
+            Diagonal::FromSecond => second <= first * TIE,
+        }
     } else {
         worst[1] > worst[0]
     };
@@ -215,7 +229,7 @@ mod tests {
     use super::*;
 
     fn quad(p: [[f64; 2]; 4]) -> [[u32; 3]; 2] {
-        halve_quad(p.map(|[x, y]| Point3::new(x, y, 0.0)))
+        halve_quad(p.map(|[x, y]| Point3::new(x, y, 0.0)), Diagonal::FromFirst)
     }
 
     #[test]

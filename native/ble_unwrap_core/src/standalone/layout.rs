@@ -166,8 +166,10 @@ fn conditioned(
     if let Some(found) = chart.map(<[i32]>::len).filter(|&found| found != faces) {
         return Err(LayoutError::ChartCount { found, faces });
     }
-    let surface = mesh::condition(input, &settings.conditioning(), progress)?;
-    let label = chart.map(|chart| surface.polygon.iter().map(|&p| chart[p as usize]).collect()).unwrap_or_default();
+    // In the form that an unwrap works on, so that polygons without triangles are judged by the same ones.
+    let surface = mesh::canonical(mesh::condition(input, &settings.conditioning(), progress)?, progress)?;
+    let label_of = |chart: &[i32]| surface.mesh.faces().map(|f| chart[surface.input_polygon(f)]).collect();
+    let label = chart.map(label_of).unwrap_or_default();
     progress.enter(Stage::Verify);
     Ok((surface, label))
 }

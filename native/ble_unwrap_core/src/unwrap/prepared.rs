@@ -25,7 +25,7 @@ impl Prepared {
         conditioning: &ConditionOptions,
         progress: &Progress,
     ) -> Result<Self, UnwrapError> {
-        let surface = mesh::condition(input, conditioning, progress)?;
+        let surface = mesh::canonical(mesh::condition(input, conditioning, progress)?, progress)?;
         let (label, count) = surface.mesh.components();
         Ok(Self { components: Groups::by_label(&label, count, FaceId::new), surface })
     }
