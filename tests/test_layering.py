@@ -205,14 +205,14 @@ def test_core_layers():
 # From a surface to charts: a file, or a folder as a whole, uses those of the rows above its own.
 CUTTING = [
     {"charted", "rigid_motion", "measured"},
-    {"state", "edit"},
+    {"state", "edit", "cost"},
     {"border", "history"},
     {"moves/mod"},
     {"moves/split", "moves/dart", "moves/net"},
     {"attempt"},
     {"trial", "divide"},
     {"search"},
-    {"moves/join", "moves/partial_join", "moves/hand_over", "moves/across"},
+    {"moves/join", "moves/partial_join", "moves/hand_over", "moves/across", "moves/zip"},
     {"whole", "atlas_limit"},
     {"level/carry", "level/prolong", "level/mod"},
     {"component"},

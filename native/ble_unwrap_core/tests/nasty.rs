@@ -1,6 +1,7 @@
 //! The whole pipeline on every kind of mesh: each result is proven, whatever went in.
 
 use ble_unwrap_core::internals::Layout;
+use ble_unwrap_core::settings::Moves;
 use ble_unwrap_core::settings::{ChartScale, Holes};
 use ble_unwrap_core::standalone::{ChartMeasures, Measures, certify, measure_layout};
 use ble_unwrap_core::{Atlas, Certificate, MeshInput, Progress, Settings, unwrap};

@@ -1,8 +1,8 @@
 //! Where a surface is cut into charts.
 //!
 //! The state is a [cutting](state): which chart has which face, and so which edges are seams. Every [move](moves) proposes an
-//! [edit](edit): edges to open, edges to glue. A [trial](trial()) flattens what an edit changes, and the [search](search())
-//! makes the edits that come to something. Charts come from patches that are [divided](divide()) until each can be
+//! [edit]: edges to open, edges to glue. A [trial](mod@trial) flattens what an edit changes, and the [search](mod@search)
+//! makes the edits that come to something. Charts come from patches that are [divided](mod@divide) until each can be
 //! flattened; on a large component this happens on a [coarse mesh](level) first.
 
 mod atlas_limit;
@@ -112,7 +112,6 @@ fn charts_of(
         // They are named in the result.
         f.indices(faces.iter().map(|face| face.index()));
         f.settings(&Settings {
-            limit_over: LimitOver::Chart,
             chart_scale: ChartScale::Uniform,
             packing: PackSettings::default(),
             ..settings.clone()

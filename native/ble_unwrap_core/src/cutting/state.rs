@@ -176,7 +176,8 @@ impl<'a> Cutting<'a> {
             if self.is_seam(h) != self.is_seam(t) {
                 return Err(format!("{h} is a seam on one side only"));
             }
-            if self.polygon(h.face()) == self.polygon(t.face()) && self.is_seam(h) {
+            let is_charted = self.owner(h.face()).is_some();
+            if is_charted && self.polygon(h.face()) == self.polygon(t.face()) && self.is_seam(h) {
                 return Err(format!("{h} is inside a polygon and a seam"));
             }
         }

@@ -5,7 +5,7 @@ use crate::charts::{Chart, Patch};
 use crate::flattening::Rungs;
 use crate::mesh::{FaceId, HalfedgeId};
 use crate::progress::Cancelled;
-use crate::settings::{Moves, Settings};
+use crate::settings::{LimitOver, Moves, Settings};
 
 use super::cost::Price;
 use super::divide::{self, Charting};
@@ -76,7 +76,8 @@ impl Whole<'_> {
         self.search(charts, &[&PartialJoin], settings, rungs, run)
     }
 
-    /// Closes cuts of charts of this mesh from their ends on, if all moves are wanted.
+    /// Closes cuts of charts of this mesh from their ends on, if all moves are wanted. Not where the limit is over the atlas: what it
+    /// leaves is for joining charts.
     pub(super) fn close(
         &self,
         charts: Vec<Chart>,
@@ -84,6 +85,9 @@ impl Whole<'_> {
         rungs: &mut Rungs,
         run: &Run<'_>,
     ) -> Result<Vec<Chart>, Cancelled> {
+        if settings.limit_over == LimitOver::Atlas {
+            return Ok(charts);
+        }
         self.search(charts, &[&Zip { limit: settings.stretch_limit }], settings, rungs, run)
     }
 

@@ -47,7 +47,7 @@ choices!(Holes {
     Cut: "cut", "Cut", "Every chart is cut open to a disk.";
 });
 
-/// What the search for charts may do.
+/// The moves that the search for charts may make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Moves {
@@ -144,7 +144,7 @@ pub struct Settings {
     /// Whether large components are first cut on a coarse copy of the mesh. When it is off, as in the paper's presets,
     /// trial embeddings also use the full number of landmarks.
     pub coarse: bool,
-    /// What the search for charts may do.
+    /// Which moves the search for charts may make.
     pub moves: Moves,
     /// What stretch costs beside seams: how long a seam, in square roots of the surface's area, an excess of 1 of the squared
     /// L2 stretch over the whole surface is worth. Charts are cut further where that saves more stretch than it costs seam,

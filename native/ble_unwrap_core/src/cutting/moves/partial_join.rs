@@ -116,7 +116,8 @@ mod tests {
             let faces = mesh.faces().filter(|f| label(mesh.triangle_positions(*f)) == wanted).collect();
             let patch = Patch::of_surface(mesh, &polygon, faces);
             let charting =
-                divide(vec![patch], settings, &|_| (), &Run::new(&Progress::new(), None)).expect("not cancelled");
+                divide(vec![patch], &Price::new(mesh, settings), settings, &|_| (), &Run::new(&Progress::new(), None))
+                    .expect("not cancelled");
             assert_eq!(charting.charts.len(), 1);
             charting.charts.into_iter().next().expect("a chart")
         };

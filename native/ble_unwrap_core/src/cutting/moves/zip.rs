@@ -92,7 +92,7 @@ impl Zip {
 }
 
 /// The cuts that end inside the chart, along a run whose two sides are the chart's own: for each the edges from its end on, on the
-/// side that comes after it.
+/// side that comes after it, up to the first guide.
 fn ends_of(cutting: &Cutting<'_>, run: &BorderRun) -> Vec<Vec<HalfedgeId>> {
     let (mesh, edges) = (cutting.mesh(), &run.edges);
     let n = edges.len();
@@ -103,7 +103,119 @@ fn ends_of(cutting: &Cutting<'_>, run: &BorderRun) -> Vec<Vec<HalfedgeId>> {
     let from = |k: usize| {
         let room = if run.is_loop { n / 2 } else { (k + 1).min(n - 1 - k) };
         let pairs = (0..room).map(|j| (at(n + k - j), at(k + 1 + j)));
-        pairs.take_while(|&(before, after)| mesh.twin(before) == after).map(|pair| pair.1).collect()
+        // Guides say where to cut.
+        let goes_on = |&(before, after): &(HalfedgeId, HalfedgeId)| mesh.twin(before) == after && !mesh.is_guide(after);
+        pairs.take_while(goes_on).map(|pair| pair.1).collect()
     };
     (0..steps).filter(is_end).map(from).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::super::super::search::search;
+    use super::*;
+    use crate::cache::Run;
+    use crate::charts::{Chart, Patch};
+    use crate::flattening::{self, Flattened, Rungs};
+    use crate::mesh::{TriMesh, test_surfaces};
+    use crate::progress::Progress;
+    use crate::settings::Settings;
+    use crate::stretch;
+    use nalgebra::Point3;
+
+    /// A sheet of 12 by 12, bent by a bump of some height in its middle, cut from there to the side at y = 6, and flattened.
+    fn slit(bump: f64) -> (TriMesh, Vec<u32>, Chart) {
+        let sheet = test_surfaces::grid(12, 12, [12.0, 12.0], 0.0);
+        let lifted = |p: &Point3<f64>| {
+            let away = (p.x - 6.0).powi(2) + (p.y - 6.0).powi(2);
+            Point3::new(p.x, p.y, bump * (-away / 8.0).exp())
+        };
+        let positions: Vec<_> = sheet.positions().iter().map(lifted).collect();
+        let triangles: Vec<_> = sheet.triangles().iter().map(|t| t.map(|v| v.index() as u32)).collect();
+        let mesh = test_surfaces::mesh(&positions, &triangles);
+        let polygon: Vec<u32> = (0..mesh.face_count() as u32).collect();
+        let on_cut = |v| sheet.position(v).y == 6.0 && sheet.position(v).x <= 6.0;
+        let cut: Vec<HalfedgeId> = mesh.edges().filter(|&h| on_cut(mesh.from(h)) && on_cut(mesh.to(h))).collect();
+        let patch = Patch::whole(Arc::new(mesh.clone()), polygon.clone()).cut(&cut);
+        let start: Vec<_> = patch.mesh.positions().iter().map(|p| p.xy()).collect();
+        let (progress, mut rungs) = (Progress::new(), Rungs::default());
+        let (settings, run) = (Settings::default(), Run::new(&progress, None));
+        let flat = flattening::isometric(&patch, &mut rungs).unwrap_or_else(|| {
+            match flattening::opened(&patch, &start, &settings, &run).expect("not cancelled") {
+                Flattened::Flat(flat) => flat,
+                Flattened::Near(_) | Flattened::Refused => panic!("it is flat enough"),
+            }
+        });
+        (mesh, polygon, flat.into_chart(patch))
+    }
+
+    /// The chart after the search, and how often it was closed.
+    fn closed(bump: f64, stretch_price: f64, limit: f64) -> (Chart, Chart, usize) {
+        let (mesh, polygon, before) = slit(bump);
+        let settings = Settings { stretch_price, stretch_limit: limit, ..Settings::default() };
+        let (progress, mut rungs) = (Progress::new(), Rungs::default());
+        let run = Run::new(&progress, None);
+        let mut cutting = Cutting::new(&mesh, &polygon, vec![before.clone()]);
+        search(&mut cutting, &mut History::default(), &[&Zip { limit }], &settings, &mut rungs, &run)
+            .expect("not cancelled");
+        cutting.check_invariants().expect("sound");
+        let after = cutting.into_charts().pop().expect("a chart");
+        assert_eq!(stretch::first_flip(&after.patch.mesh, &after.uv), None);
+        assert!(stretch::boundary_is_simple(&after.patch.mesh, &after.uv) && after.l2 <= limit);
+        let times = rungs.taken().iter().find(|(name, _)| *name == "zip").map_or(0, |r| r.1);
+        (before, after, times)
+    }
+
+    fn around(chart: &Chart) -> f64 {
+        chart.patch.mesh.boundary_length()
+    }
+
+    #[test]
+    fn a_cut_in_a_flat_sheet_is_closed_but_for_its_mouth() {
+        let (before, after, times) = closed(0.0, 20.0, 1.1);
+        assert_eq!((around(&before), around(&after)), (60.0, 48.0));
+        assert!(times >= 1 && (after.l2 - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_cut_that_the_limit_needs_stays() {
+        let needed = slit(3.0).2.l2 + 1e-6;
+        let (before, after, times) = closed(3.0, 0.0, needed);
+        assert!(times == 0 && around(&after) == around(&before), "{times}");
+    }
+
+    #[test]
+    fn a_cut_along_a_guide_stays() {
+        let (mesh, polygon, chart) = slit(0.0);
+        let on_cut = |v| mesh.position(v).y == 6.0;
+        let is_guide = |h: HalfedgeId| on_cut(mesh.from(h)) && on_cut(mesh.to(h));
+        let guided = mesh.clone().with_guides(mesh.halfedges().map(is_guide).collect());
+        let cutting = Cutting::new(&guided, &polygon, vec![chart]);
+        let settings = Settings::default();
+        let sites = Zip { limit: 1.1 }.sites(&cutting, &History::default(), &Price::new(&guided, &settings));
+        assert!(sites.is_empty());
+    }
+
+    #[test]
+    fn the_price_decides_what_the_limit_allows() {
+        let (before, free, _) = closed(3.0, 0.0, 1.1);
+        let (_, dear, _) = closed(3.0, 1e3, 1.1);
+        assert!(around(&free) < around(&before) && free.l2 > before.l2);
+        assert!(around(&dear) > around(&free) && dear.l2 < free.l2);
+    }
+
+    #[test]
+    fn the_ends_of_cuts_are_found_with_the_edges_from_there_on() {
+        let (mesh, polygon, chart) = slit(0.0);
+        let cutting = Cutting::new(&mesh, &polygon, vec![chart]);
+        let id = cutting.ids().next().expect("a chart");
+        let runs = border::runs(&cutting, id, |other| other == id);
+        let ends: Vec<Vec<HalfedgeId>> = runs.iter().flat_map(|run| ends_of(&cutting, run)).collect();
+        assert_eq!((ends.len(), ends[0].len()), (1, 6));
+        let tip = mesh.position(mesh.from(ends[0][0]));
+        assert_eq!((tip.x, tip.y), (6.0, 6.0));
+        assert!(ends[0].windows(2).all(|pair| mesh.to(pair[0]) == mesh.from(pair[1])), "from the end on");
+    }
 }
