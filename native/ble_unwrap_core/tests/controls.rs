@@ -58,9 +58,7 @@ fn borders_follow_guides_on_small_and_on_large_meshes() {
         assert_eq!(guides.len(), around, "a circle");
         let on_guides = |guided: &[[i32; 2]]| {
             let input = MeshInput { guides: guided, ..input(&mesh, &flat) };
-            // Where stretch has a price the halves are cut further, and then hang together on a part of the circle.
-            let settings = Settings { stretch_price: 0.0, ..Settings::default() };
-            let atlas = unwrap(&input, &settings, &Progress::new()).expect("unwraps");
+            let atlas = unwrap(&input, &Settings::default(), &Progress::new()).expect("unwraps");
             assert!(atlas.report.charts_over_limit.is_empty() && atlas.report.flips == 0 && atlas.report.overlaps == 0);
             borders(&flat, &atlas).iter().filter(|side| guides.contains(side)).count()
         };

@@ -14,7 +14,7 @@ use crate::settings::{Holes, Moves, Settings};
 
 use super::measured::{Measured, analyse};
 use super::moves::dart::Bulging;
-use super::moves::net;
+use super::moves::{net, split};
 
 /// Patches less planar than this are split before any flattening. Far below what the embedding alone would
 /// need (a cap of 100° has 0.79): stretch minimisation brings patches of 0.66 under an L2 of 1.1, and on
@@ -75,6 +75,14 @@ impl<'a> Attempt<'a> {
             if let Some(chart) = self.net(rungs) {
                 return Ok(Some(chart));
             }
+            if self.settings.stretch_price > 0.0 {
+                if let Some(chart) = self.unrolled(rungs) {
+                    return Ok(Some(chart));
+                }
+                if split::unrolling_parts(patch, self.settings).is_some() {
+                    return Ok(None);
+                }
+            }
             let flattened = match flattening::projected(patch, self.settings, rungs, self.run)? {
                 Some(verdict) => verdict,
                 None if bulging.as_ref().map_err(|c| *c)?.as_ref().is_some_and(|r| !r.is_promising()) => {
@@ -97,25 +105,44 @@ impl<'a> Attempt<'a> {
         // A few faces are not worth a cut.
         let blob = self.topology.loops == 0 && self.topology.genus() == 0;
         if blob {
-            return match self.net(rungs) {
-                Some(chart) => Ok(Some(chart)),
-                None => self.cut_by_darts((*bulging).clone()?, rungs),
-            };
+            if let Some(chart) = self.net(rungs) {
+                return Ok(Some(chart));
+            }
+            if self.settings.stretch_price > 0.0 && split::unrolling_parts(patch, self.settings).is_some() {
+                return Ok(None);
+            }
+            return self.cut_by_darts((*bulging).clone()?, rungs);
         }
         if self.topology.is_disk() || patch.faces.len() < LEAST_FACES_TO_CUT {
             return Ok(None);
         }
-        let length = |h| patch.mesh.edge_length(h) * patch.mesh.border_cost(h);
-        let diagonal = |h| patch.is_diagonal(h);
         if self.topology.genus() > 0 && self.settings.holes == Holes::Keep {
-            let open = patch.cut(&charts::cut_open(&patch.mesh, length, diagonal));
+            let length = |h| patch.mesh.edge_length(h) * patch.mesh.border_cost(h);
+            let open = patch.cut(&charts::cut_open(&patch.mesh, length, |h| patch.is_diagonal(h)));
             let is_disk = open.mesh.topology().is_disk();
             let chart = self.run_cut(open, rungs)?;
             if chart.is_some() || is_disk {
                 return Ok(chart);
             }
         }
-        self.run_cut(patch.cut(&charts::cut_to_disk(&patch.mesh, length, diagonal)), rungs)
+        self.run_cut(self.cut_to_disk(), rungs)
+    }
+
+    fn cut_to_disk(&self) -> Patch {
+        let patch = self.patch();
+        let length = |h| patch.mesh.edge_length(h) * patch.mesh.border_cost(h);
+        patch.cut(&charts::cut_to_disk(&patch.mesh, length, |h| patch.is_diagonal(h)))
+    }
+
+    /// The wall of a tube or the like, which lies flat once it is cut from one hole to the other.
+    fn unrolled(&self, rungs: &mut Rungs) -> Option<Chart> {
+        if self.topology.loops < 2 {
+            return None;
+        }
+        let open = self.cut_to_disk();
+        let flat = flattening::isometric(&open, rungs)?;
+        rungs.take(Rung::CutOpen);
+        Some(flat.into_chart(open))
     }
 
     fn run_cut(&self, open: Patch, rungs: &mut Rungs) -> Result<Option<Chart>, Cancelled> {

@@ -19,8 +19,6 @@ const COARSE_ABOVE: usize = 3_000;
 /// On the fine mesh only charts that a split there has made are joined again, and only up to so many faces: the
 /// others have been tried on the coarse mesh.
 const FINE_UNION: usize = 20_000;
-/// Share of the area that unrolls of a component that is charted as it is, however large. A little is left to rounding.
-const ALL: f64 = 1.0 - 1e-6;
 /// Share of the work on a component that the coarse mesh takes.
 const COARSE_WORK: f64 = 0.4;
 
@@ -38,7 +36,7 @@ pub(crate) fn charts(
     let mut rungs = Rungs::default();
     let is_large = whole.mesh.vertex_count() > COARSE_ABOVE && settings.coarse;
     // What unrolls needs no trials that a coarse mesh would make cheap, and has its edges on the fine one.
-    let unrolling = is_large.then(|| split::hard_parts(whole, ALL, settings)).flatten();
+    let unrolling = is_large.then(|| split::unrolling_parts(whole, settings)).flatten();
     let mut charts = if is_large && unrolling.is_none() {
         let coarse = OnCoarse::new(fine, settings, run)?;
         let parts = coarse.parts(&mut rungs, run)?;

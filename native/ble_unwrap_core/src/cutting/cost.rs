@@ -14,6 +14,10 @@ use crate::settings::Settings;
 /// A chart costs as much as a seam of so many √A: with less, strips are left that nobody would cut off; with more, charts hang
 /// together by a few edges.
 pub(super) const CHART: f64 = 1.5;
+/// A chart of at most this L2 stretch is unrolled: half a degree between the normals of two faces gives 1.0001, and nobody sees a
+/// tenth of a per cent.
+const UNROLLED: f64 = 1.001;
+
 /// The prices on one surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Price {
@@ -58,8 +62,18 @@ impl Price {
         settings.stretch_limit.min((1.0 + 1.0 / (self.stretch * width)).sqrt())
     }
 
-    /// Whether some charts are better than those in whose place they would come.
+    /// Whether what unrolls may be bent: where stretch has no price, the limit alone says so.
+    pub(super) fn may_bend(&self) -> bool {
+        self.stretch <= 0.0
+    }
+
+    /// Whether some charts are better than those in whose place they would come. That the limit allows it is no reason to bend what
+    /// unrolls.
     pub(super) fn is_worth(&self, old: &[&Chart], new: &[Chart]) -> bool {
+        let unrolls = |chart: &Chart| chart.l2 <= UNROLLED;
+        if !self.may_bend() && old.iter().all(|chart| unrolls(chart)) && !new.iter().all(unrolls) {
+            return false;
+        }
         let before: f64 = old.iter().map(|chart| self.of(chart)).sum();
         let after: f64 = new.iter().map(|chart| self.of(chart)).sum();
         after < before
@@ -105,6 +119,16 @@ mod tests {
         assert!(worth(&bent, &stretched(even - 0.01)) && !worth(&bent, &stretched(even + 0.02)));
         assert!(worth(&stretched(even + 0.01), &two) && !worth(&stretched(even - 0.01), &two));
         assert!(worth(&two, &one) && !worth(&two, &two));
+    }
+
+    #[test]
+    fn what_unrolls_is_bent_only_where_stretch_has_no_price() {
+        let mesh = test_surfaces::grid(6, 4, [6.0, 4.0], 0.0);
+        let (one, two) = (strips(&mesh, 6.0, 1).1, strips(&mesh, 6.0, 2).1);
+        let bent = [Chart { l2: 1.002, ..one[0].clone() }];
+        let old: Vec<&Chart> = two.iter().collect();
+        assert!(!price(&mesh, 1e-3).is_worth(&old, &bent) && price(&mesh, 0.0).is_worth(&old, &bent));
+        assert!(price(&mesh, 1e-3).is_worth(&old, &one));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! How large charts are beside each other.
+//! The size that each chart is drawn at.
 
 use crate::charts::Chart;
 use crate::distortion;

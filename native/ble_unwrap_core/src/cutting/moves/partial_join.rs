@@ -59,6 +59,10 @@ struct Part {
 /// The longest part of a run where the two charts fit.
 fn part(cutting: &Cutting<'_>, history: &History, id: ChartId, run: &BorderRun) -> Option<Part> {
     let mesh = cutting.mesh();
+    // Guides say where to cut: all of one, or none.
+    if run.edges.iter().any(|&h| mesh.is_guide(h)) {
+        return None;
+    }
     let fit = *FITS.get(history.refusals(MoveKind::PartialJoin, Place::between(id, run.beyond)))?;
     let [one, other] = [cutting.chart(id)?.patch.area(), cutting.chart(run.beyond)?.patch.area()];
     // Of a whole loop any part may be glued, wherever it begins, but for two edges at least.

@@ -16,9 +16,17 @@ const MOST_SPECTRAL_SPLITS: u32 = 24;
 /// A patch that is split comes apart at its hard edges where parts that unroll have at least this share of its area.
 const MOSTLY_UNROLLED: f64 = 0.9;
 
+/// Share of the area that unrolls where all of it does. A little is left to rounding.
+const ALL: f64 = 1.0 - 1e-6;
+
+/// The parts of a patch between its hard edges, if all of them unroll: a cylinder's wall and its caps. Not in the paper's presets.
+pub(crate) fn unrolling_parts(patch: &Patch, settings: &Settings) -> Option<Vec<Patch>> {
+    hard_parts(patch, ALL, settings)
+}
+
 /// The parts of a patch between its hard edges, if those that unroll have at least a share of its area, and not in the paper's
 /// presets.
-pub(crate) fn hard_parts(patch: &Patch, least_share: f64, settings: &Settings) -> Option<Vec<Patch>> {
+fn hard_parts(patch: &Patch, least_share: f64, settings: &Settings) -> Option<Vec<Patch>> {
     if settings.moves != Moves::All {
         return None;
     }
