@@ -106,7 +106,7 @@ def test_a_limit_over_the_atlas(blob):
     assert atlas["chart_limit"] == pytest.approx(1.06) and atlas["atlas_limit"] == 1.015
     assert atlas["charts"] < charts["charts"]
     assert 1.015 < atlas["l2_worst_chart"] <= 1.06, "single charts have more than the limit"
-    assert charts["l2"] < atlas["l2"] <= 1.015
+    assert atlas["l2"] <= 1.015
     assert atlas["charts_over_limit"] == [] and atlas["warnings"] == []
     assert atlas["flips"] == atlas["overlaps"] == 0
     with pytest.raises(native.InvalidArgumentError, match="limit_over: expected 'chart' or 'atlas'; found 'mesh'"):
