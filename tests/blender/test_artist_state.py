@@ -45,7 +45,7 @@ def test_marking_seams_five_times_gives_the_same(mode):
         edit(obj)
     results = []
     for _ in range(5):
-        unwrap(mark_seams=True, stretch_limit=1.02)
+        unwrap(mark_seams=True, stretch_limit=1.02, stretch_price=0)
         charts = chart_count()
         bpy.ops.object.mode_set(mode="OBJECT")
         results.append((charts, seams(obj).tobytes(), uvs(obj).tobytes()))
@@ -57,13 +57,13 @@ def test_marking_seams_five_times_gives_the_same(mode):
 
 def test_seams_of_the_artist_are_kept_apart_from_ours():
     obj = bent()
-    unwrap(mark_seams=True, stretch_limit=1.02)
+    unwrap(mark_seams=True, stretch_limit=1.02, stretch_price=0)
     ours = seams(obj)
     added = int(np.flatnonzero(~ours)[7])
     obj.data.edges[added].use_seam = True
-    unwrap(mark_seams=True, stretch_limit=1.02)
+    unwrap(mark_seams=True, stretch_limit=1.02, stretch_price=0)
     assert obj.data.edges[added].use_seam
-    assert not unwrap(mark_seams=True, stretch_limit=1.5) - {"FINISHED"}
+    assert not unwrap(mark_seams=True, stretch_limit=1.5, stretch_price=0) - {"FINISHED"}
     after = seams(obj)
     assert obj.data.edges[added].use_seam, "the artist's seam is kept whatever the charts are"
     assert after.sum() < ours.sum(), "ours are replaced by those of fewer charts"
@@ -71,23 +71,23 @@ def test_seams_of_the_artist_are_kept_apart_from_ours():
 
 def test_our_seam_that_the_artist_clears_is_not_marked_again():
     obj = bent()
-    unwrap(mark_seams=True, stretch_limit=1.02)
+    unwrap(mark_seams=True, stretch_limit=1.02, stretch_price=0)
     ours = seams(obj)
     cleared = int(np.flatnonzero(ours)[3])
     obj.data.edges[cleared].use_seam = False
     for _ in range(2):
-        unwrap(mark_seams=True, stretch_limit=1.02)
+        unwrap(mark_seams=True, stretch_limit=1.02, stretch_price=0)
         expected = ours.copy()
         expected[cleared] = False
         assert np.array_equal(seams(obj), expected)
     obj.data.edges.foreach_set("use_seam", np.zeros(len(ours), bool))
-    unwrap(mark_seams=True, stretch_limit=1.02)
+    unwrap(mark_seams=True, stretch_limit=1.02, stretch_price=0)
     assert np.array_equal(seams(obj), ours), "who clears them all begins anew"
 
 
 def test_seams_of_a_selection_leave_the_others_alone():
     obj = bent()
-    unwrap(mark_seams=True, stretch_limit=1.02)
+    unwrap(mark_seams=True, stretch_limit=1.02, stretch_price=0)
     before = seams(obj)
     chosen = [face.index for face in obj.data.polygons if face.center.z > 0]
     edit(obj, faces=chosen)
@@ -97,12 +97,12 @@ def test_seams_of_a_selection_leave_the_others_alone():
     touched = {keys[tuple(sorted(key))] for index in chosen for key in obj.data.polygons[index].edge_keys}
     rest = np.array([number not in touched for number in range(len(before))])
     assert np.array_equal(seams(obj)[rest], before[rest])
-    unwrap(mark_seams=True, stretch_limit=1.02)
+    unwrap(mark_seams=True, stretch_limit=1.02, stretch_price=0)
     assert np.array_equal(seams(obj), before), "all of them were ours, and are replaced"
 
 
 def test_a_cylinder_opens_at_its_marked_seams():
-    """Along its length and around both caps: three charts, where the method alone finds one."""
+    """Along its length and around both caps: three charts, where the method alone finds one if stretch has no price."""
     bpy.ops.mesh.primitive_cylinder_add(vertices=24)
     obj = bpy.context.object
     for layer in list(obj.data.uv_layers):
@@ -116,7 +116,7 @@ def test_a_cylinder_opens_at_its_marked_seams():
     unwrap()
     assert chart_count() == "3 charts"
     assert all(is_cut(obj, index) for index in marked)
-    unwrap(use_seams=False)
+    unwrap(use_seams=False, follow_seams=False, stretch_price=0)
     assert chart_count() == "1 chart"
 
 
