@@ -33,7 +33,7 @@ const COARSE_VERTICES: (usize, usize) = (1_500, 20_000);
 /// On the coarse mesh the stretch above 1 must stay under this share of what the limit allows: detail
 /// that the collapse removed adds some.
 const COARSE_ALLOWANCE: f64 = 0.6;
-/// The same where cuts are closed.
+/// The same where cuts are closed: a chart that does not hold on the fine mesh goes back to what it was, so more may be tried.
 const COARSE_ALLOWANCE_TO_CLOSE: f64 = 0.9;
 /// A flattening there only has to tell whether the limit is kept, and where to begin: it may end so many times sooner.
 const COARSE_TOLERANCE: f64 = 10.0;

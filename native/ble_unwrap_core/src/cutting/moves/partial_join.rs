@@ -27,7 +27,7 @@ const LEAST_GLUED: f64 = 0.2;
 /// Failed trials a chart may take part in before it is left alone.
 const MOST_FAILURES: usize = 3;
 
-/// Two charts as they lie, glued along a part of a run of their border, longest part first. Each chart takes part in at most
+/// Two charts as they lie, glued along a part of a run of their border that no guide is on, longest part first. Each chart takes part in at most
 /// [`MOST_FAILURES`] failed trials, so the number of trials is linear in the number of charts.
 pub(crate) struct PartialJoin;
 

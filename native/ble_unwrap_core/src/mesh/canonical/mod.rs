@@ -10,8 +10,8 @@
 //! 2. A side is chosen to start from, and the polygons are visited from there breadth first, each from the side by which
 //!    it is reached ([`traversal`]). Where several sides look the same, a symmetry of the shape leads from one to the
 //!    other, and whichever is taken gives the same form.
-//! 3. A frame is spanned by vertices early in that order, and coordinates in it are rounded so far that the rounding of
-//!    the input does not survive ([`placement`]).
+//! 3. A frame is spanned by one of the longest sides and the normal of one of the largest polygons, the first in that order, and
+//!    coordinates in it are rounded so far that the rounding of the input does not survive ([`placement`]).
 //! 4. Polygons whose triangles nobody gave are divided anew, each from the side by which it was reached.
 
 mod cells;

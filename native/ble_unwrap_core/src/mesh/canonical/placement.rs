@@ -13,9 +13,9 @@ use crate::mesh::tri_mesh::TriMesh;
 /// motions of twenty-one shapes still gave the same charts. A coarser grid would break ties between distances, which are
 /// kept in single precision: with 2⁻²⁷, 54 shapes had 2 % more charts than with this one.
 const GRID: f64 = 1.0 / (1u64 << 34) as f64;
-/// or of this share of the smallest feature at the vertex, rounded down to a power of two,
+/// At a vertex with a smaller feature beside it they are rounded to this share of that feature, rounded down to a power of two.
 const FEATURE_SHARE: f64 = 1.0 / (1u64 << 10) as f64;
-/// but of no less than this, in the same unit as the grid: below, all digits of a double are kept anyway.
+/// No grid is finer than this, in the same unit as the usual one: below, all digits of a double are kept anyway.
 const FINEST: f64 = 1.0 / (1u64 << 44) as f64;
 /// A corner lower than this share of its longer side is a straight one, not a feature: rounding makes it so.
 const STRAIGHT: f64 = 1.0 / (1u64 << 34) as f64;
