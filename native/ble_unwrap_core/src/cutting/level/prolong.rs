@@ -407,4 +407,23 @@ mod tests {
         let across = path_between(&part, at(0.0, 3.0), Some(at(8.0, 3.0)), 9.0);
         assert_eq!(without_stubs(&mesh, across, &[]).len(), 8, "from border to border");
     }
+
+    #[test]
+    fn paths_side_by_side_cut_nothing_off_and_a_cut_adrift_is_joined_to_the_border() {
+        let part = whole(&test_surfaces::grid(8, 8, [8.0, 8.0], 0.0));
+        let at = |x, y| nearest(&part.mesh, x, y);
+        let between = |a, b| path_between(&part, a, Some(b), 9.0);
+        let tip = at(5.0, 3.0);
+        let beside = [between(tip, at(0.0, 3.0)), between(tip, at(5.0, 4.0)), between(at(5.0, 4.0), at(0.0, 4.0))];
+        let beside = beside.concat();
+        assert_eq!(part.cut(&beside).mesh.topology().components, 2, "the strip between them");
+        let one = repaired(&part, beside, &[tip], 9.0);
+        assert!(part.cut(&one).mesh.topology().is_disk() && !one.is_empty());
+        let adrift = between(at(3.0, 3.0), tip);
+        assert_eq!(part.cut(&adrift).mesh.topology().loops, 2, "a hole without area");
+        let landed = repaired(&part, adrift.clone(), &[tip], 9.0);
+        assert!(part.cut(&landed).mesh.topology().is_disk());
+        assert!(slit(&part.cut(&landed), tip).0 > 0, "it is still cut");
+        assert_eq!(repaired(&part, adrift.clone(), &[tip], 1.0), adrift, "no border within reach");
+    }
 }
