@@ -128,19 +128,20 @@ pub(super) fn cut_to(patch: &Patch, tip: VertexId, root: Option<VertexId>) -> Op
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::mesh::{TriMesh, measure, test_surfaces};
     use crate::progress::Progress;
     use nalgebra::Point3;
 
-    fn whole(mesh: TriMesh) -> Patch {
+    /// A connected mesh as a patch of itself, every triangle a polygon.
+    pub(crate) fn whole(mesh: TriMesh) -> Patch {
         let polygon = (0..mesh.face_count() as u32).collect();
         Patch::whole(Arc::new(mesh), polygon)
     }
 
     /// A mesh with its vertices moved.
-    fn moved(mesh: &TriMesh, to: impl Fn(Point3<f64>) -> Point3<f64>) -> TriMesh {
+    pub(crate) fn moved(mesh: &TriMesh, to: impl Fn(Point3<f64>) -> Point3<f64>) -> TriMesh {
         let positions: Vec<_> = mesh.positions().iter().map(|&p| to(p)).collect();
         let triangles: Vec<_> = mesh.triangles().iter().map(|t| t.map(|v| v.index() as u32)).collect();
         test_surfaces::mesh(&positions, &triangles)

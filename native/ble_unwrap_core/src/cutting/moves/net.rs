@@ -33,23 +33,10 @@ pub(crate) fn net(patch: &Patch) -> Option<Patch> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
+    use super::super::dart::tests::{moved, whole};
     use super::*;
     use crate::mesh::{HalfedgeId, TriMesh, test_surfaces};
     use nalgebra::Point3;
-
-    fn whole(mesh: TriMesh) -> Patch {
-        let polygon = (0..mesh.face_count() as u32).collect();
-        Patch::whole(Arc::new(mesh), polygon)
-    }
-
-    /// A mesh with its vertices moved.
-    fn moved(mesh: &TriMesh, to: impl Fn(Point3<f64>) -> Point3<f64>) -> TriMesh {
-        let positions: Vec<_> = mesh.positions().iter().map(|&p| to(p)).collect();
-        let triangles: Vec<_> = mesh.triangles().iter().map(|t| t.map(|v| v.index() as u32)).collect();
-        test_surfaces::mesh(&positions, &triangles)
-    }
 
     #[test]
     fn a_box_has_a_net_whole_or_open_and_a_ball_has_none() {
