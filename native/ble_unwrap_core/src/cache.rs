@@ -14,9 +14,9 @@ use crate::geodesics::LandmarkDistances;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 
-/// Memory of a cache: as much as one unwrap takes beside it at its peak, per face of the mesh, and
+/// Memory of a cache per face of the mesh: as much as one unwrap takes beside it at its peak.
 const BYTES_A_FACE: usize = 1024;
-/// no less than this, for small meshes.
+/// Least memory of a cache, for small meshes.
 const LEAST_BYTES: usize = 64 << 20;
 
 /// Kinds of results; each is of one type.

@@ -13,11 +13,11 @@
 use crate::collections::{DisjointSets, MinHeap};
 use crate::mesh::{FaceId, Groups, HalfedgeId, TriMesh, VertexId};
 
-/// At most so many bases are tried for the shortest cut,
+/// Greatest number of bases tried for the shortest cut.
 const MAX_BASES: usize = 8;
-/// and at least so many, even on large meshes,
+/// Least number of bases tried, even on large meshes.
 const MIN_BASES: usize = 2;
-/// where otherwise so many faces are looked at in all.
+/// Between these bounds as many bases are tried as make so many faces to be looked at in all.
 const FACES_FOR_ALL_BASES: usize = 100_000;
 
 /// Larger weights count as this: sums over a whole mesh must stay finite.

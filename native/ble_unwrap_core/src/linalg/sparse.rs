@@ -43,9 +43,9 @@ const MAX_COLUMNS: usize = 2;
 /// Added to the diagonal of a matrix in single precision, relative to it: well above what rounding there takes from the
 /// last pivots.
 const ROUGH_RIDGE: f64 = 1e-6;
-/// The conjugate gradients end when the residual has fallen to this share: Newton's method needs no more of a direction,
+/// The conjugate gradients end when the residual has fallen to this share: Newton's method needs no more of a direction.
 const RESIDUAL: f64 = 1e-4;
-/// or after so many steps.
+/// The conjugate gradients end after so many steps, however large the residual is.
 const MOST_STEPS: usize = 24;
 
 /// LLᵀ of a sparse symmetric positive definite matrix: owns the symbolic analysis (approximate

@@ -3,10 +3,10 @@
 use std::fs;
 use std::path::Path;
 
-/// Where the kernels' first source, `/sys`, cannot be read whole, they ask this program,
+/// Where the kernels' first source, `/sys`, cannot be read whole, they ask this program. Where there is none they ask the processor,
+/// as on every other system.
 const LSCPU: [&str; 3] = ["/usr/bin/lscpu", "/bin/lscpu", "/usr/local/bin/lscpu"];
-/// and where there is none the processor, as it is asked on every other system. At least so much they take in any case:
-/// four times the second cache, of which 4 MiB are the most built.
+/// The kernels take the cache to be at least so large: four times the second cache, of which 4 MiB are the most built.
 const LEAST: u64 = 16 << 20;
 
 /// An upper bound of what faer's kernels take for the size of the last cache, in bytes.

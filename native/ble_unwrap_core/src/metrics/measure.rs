@@ -20,9 +20,9 @@ use super::uv_topology::{NONE, UvTopology};
 pub(crate) const DEGENERATE: f64 = 1e-7;
 /// Share of the layout's box that two triangles must have in common to count as an overlap.
 const OVERLAP_SHARE: f64 = 1e-9;
-/// Charts with less of the surface than this do not compete for the worst stretch,
+/// Charts with less than this share of the surface do not compete for the worst stretch, unless even the largest is so small.
 const SPECK: f64 = 1e-4;
-/// unless even the largest chart is so small: then those do that have at least this share of its area.
+/// Where even the largest chart is a [`SPECK`], charts with at least this share of its area compete for the worst stretch.
 const SPECK_AMONG_SMALL: f64 = 1e-2;
 /// What a triangle takes at the peak, in bytes: 700 were measured where each is a chart of its own, 340 in one chart.
 const OF_TRIANGLE: u64 = 1024;

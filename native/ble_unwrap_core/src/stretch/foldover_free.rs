@@ -17,27 +17,27 @@ use crate::distortion::RestTriangle;
 use crate::mesh::{FaceId, TriMesh};
 use crate::progress::Progress;
 
-/// Newton steps in a round,
+/// A round has so many Newton steps; after each it is asked whether the flips fall.
 const ROUND: usize = 5;
-/// and rounds at most. Starts that resemble the surface take 3 to 35 steps; vertices scattered at random are not
+/// Greatest number of rounds. Starts that resemble the surface take 3 to 35 steps; vertices scattered at random are not
 /// untangled in 120 either, and Tutte's embedding serves them sooner.
 const MOST_ROUNDS: usize = 8;
-/// In so many rounds
+/// Rounds in which the flips must fall to [`LEAST_CLEARED`], or clearing is given up.
 const PATIENT: usize = 2;
-/// the flips must fall to this share, or it is given up.
+/// Greatest share of the flips that may be left after [`PATIENT`] rounds.
 const LEAST_CLEARED: f64 = 0.8;
-/// It is given up, too, once they have risen to so many times as many as there were,
+/// Clearing is given up once there are more than so many times the flips that it began with, and [`RISE_FORGIVEN`] more: of 1,300
+/// clearings that ended well one in ten rose so high, of 500 that failed half did, at the end of their first round.
 const MOST_RISEN: f64 = 2.5;
-/// and so many more: of 1,300 clearings that ended well one in ten rose so high, of 500 that failed half did, at the end of
-/// their first round.
+/// Flips that may be added whatever their share, since a few flips often become some more on their way.
 const RISE_FORGIVEN: f64 = 10.0;
-/// Where only the neighbourhood of flips moves, so many of them must fall to [`LEAST_CLEARED`] in the first round:
+/// Where only the neighbourhood of flips moves, and there are so many, they must fall to [`LEAST_CLEARED`] in the first round:
 /// of 39 clearings that did not so, on the development models, an assembly of a hundred parts and plates pierced by
 /// finely divided holes, none ended well.
 const VERY_MANY: usize = 300;
-/// So many must not rise to more than
+/// Where there are so many flips, they must not rise by [`MOST_RISEN_OF_MANY`] in the first round.
 const MANY: usize = 100;
-/// so many times as many in the first round: of 51 that did so on the same meshes none ended well.
+/// Rise at which [`MANY`] flips are given up: of 51 clearings on the same meshes whose flips rose by more none ended well.
 const MOST_RISEN_OF_MANY: f64 = 1.3;
 /// ε to begin with, the paper's. Over 16 models 0.3, 0.1, 0.03 give more charts, by 1, 7 and 22 %, and 2 gives 9 % more.
 const WIDE: f64 = 1.0;

@@ -12,14 +12,14 @@ use crate::distortion::RestTriangle;
 use crate::mesh::TriMesh;
 use crate::progress::Progress;
 
-/// Up to this share of flipped triangles, and always if they are no more than
+/// Up to this share of flipped triangles, they are cleared in their neighbourhoods. Otherwise all vertices move, which clears hardly
+/// a map that resists in its neighbourhoods.
 const FEW_FLIPS: f64 = 0.1;
-/// so many, they are cleared in their neighbourhoods of so many rings (else all vertices move, which clears hardly one that
-/// resists in its neighbourhood),
+/// So many flipped triangles are cleared in their neighbourhoods whatever their share is.
 const ALWAYS_FEW: usize = 8;
-/// the second only where the first was too narrow.
+/// Rings in a neighbourhood of flips; the second only where the first was too narrow.
 const NEIGHBOURHOODS: [usize; 2] = [3, 8];
-/// Each is smoothed first, by so many sweeps: a fold that hangs together is spread over it.
+/// Each neighbourhood is smoothed first, by so many sweeps: a fold that hangs together is spread over it.
 const SWEEPS: usize = 30;
 
 /// How a map came to have no flips; each rung of the ladder is tried only if those before it failed.

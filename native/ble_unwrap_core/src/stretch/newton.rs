@@ -30,23 +30,22 @@ const WARM_UP: usize = 3;
 const ABANDON_AFTER: usize = 5;
 /// A chart is abandoned if so many times its last gain would not bring it under the limit.
 const ABANDON_GAINS: f64 = 4.0;
-
-/// Or if after so many
+/// After so many iterations a chart is abandoned, too, if it is still [`FAR`] above the limit.
 const FAR_AFTER: usize = 10;
-/// it is still this far above the limit.
+/// So many times the limit is far above it.
 const FAR: f64 = 1.5;
 /// Under the barrier the last steps win little, and slowly: the tolerance is so many times what it is without.
 const APART_TOLERANCE: f64 = 10.0;
 
-/// A triangle of more than this squared stretch is among the worst,
+/// A triangle of more than this squared stretch is among the worst, which are mended first, and last.
 const WORST: f64 = 3.0;
-/// which are mended first, and last, if they are at most this share of all,
+/// The worst triangles are mended by themselves if they are at most this share of all.
 const MOST_WORST: f64 = 0.05;
-/// so many rings around them,
+/// So many rings around the worst triangles move with them.
 const WORST_RINGS: usize = 4;
-/// by so many steps at most, or until one gains less than this share.
+/// The worst triangles are mended by so many steps at most.
 const WORST_STEPS: usize = 12;
-/// See [`WORST_STEPS`].
+/// Mending the worst triangles ends when a step gains less than this share.
 const WORST_TOLERANCE: f64 = 1e-2;
 
 /// Minimises over all vertices; `start` has been checked to be positive, and simple if that is to

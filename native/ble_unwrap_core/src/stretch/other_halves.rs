@@ -7,9 +7,10 @@ use crate::distortion::{RestTriangle, squared_stretch};
 use crate::mesh::{Quad, TriMesh, VertexId};
 use crate::predicates::orientation;
 
-/// A half that is stretched more than this (squared; 1 is not at all),
+/// A quad is crowded if a half of it by its other diagonal has more squared stretch than this (1 is an isometry), and
+/// [`CROWDED_OVER_OWN`] holds.
 const CROWDED: f64 = 4.0;
-/// and so many times as much as any triangle by the quad's own diagonal, makes a quad crowded.
+/// A crowded quad has a half that is stretched so many times as much as any triangle by its own diagonal.
 const CROWDED_OVER_OWN: f64 = 2.0;
 
 /// Some quads of a chart, and the two triangles that each has by its other diagonal: where these are positive, and those by

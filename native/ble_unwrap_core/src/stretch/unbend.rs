@@ -25,9 +25,9 @@ const WEIGHTS: [f64; 3] = [1.0, 0.1, 0.01];
 /// Where all bent quads together do so still, so many at most are mended one by one.
 const MOST_SINGLY: usize = 16;
 /// Quads that are crowded but not bent are left alone where they are more than this share of all: that is then how the surface
-/// is, and would cost as much as another minimisation of the chart,
+/// is, and relaxing them would cost as much as another minimisation of the chart.
 const MOST_CROWDED: f64 = 0.1;
-/// which is nothing where they are no more than this.
+/// So many crowded quads are relaxed whatever their share is, since that costs next to nothing.
 const ALWAYS_FEW: f64 = 50.0;
 
 /// A map whose quads are less bent.
