@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
-use super::cells::Cells;
+use super::polygons::Polygons;
 use crate::mesh::index::{HalfedgeId, VertexId};
 use crate::mesh::tri_mesh::TriMesh;
 use crate::random;
@@ -21,10 +21,10 @@ const TOGETHER: usize = 1024;
 /// A colour for each vertex and side, of one component after the other.
 pub(super) struct Colours<'a> {
     mesh: &'a TriMesh,
-    cells: &'a Cells<'a>,
+    polygons: &'a Polygons<'a>,
     /// Whether colours tell the division into triangles, too.
     divided: bool,
-    /// The area of the cells at each vertex, shared among their corners.
+    /// The area of the polygons at each vertex, shared among their corners.
     weight: Vec<f64>,
     /// Distance of each vertex from the middle of its component, in units of its size.
     pub(super) radius: Vec<f64>,
@@ -34,15 +34,15 @@ pub(super) struct Colours<'a> {
 
 impl<'a> Colours<'a> {
     /// With `own_triangles` the division into triangles does not matter.
-    pub(super) fn new(mesh: &'a TriMesh, cells: &'a Cells<'a>, own_triangles: bool) -> Self {
+    pub(super) fn new(mesh: &'a TriMesh, polygons: &'a Polygons<'a>, own_triangles: bool) -> Self {
         let mut weight = vec![0.0; mesh.vertex_count()];
-        for cell in 0..cells.len() {
-            let share = cells.area_vector(cell).norm() / (cells.faces(cell).len() + 2) as f64;
-            cells.sides(cell).for_each(|h| weight[mesh.from(h).index()] += share);
+        for polygon in 0..polygons.len() {
+            let share = polygons.area_vector(polygon).norm() / (polygons.faces(polygon).len() + 2) as f64;
+            polygons.sides(polygon).for_each(|h| weight[mesh.from(h).index()] += share);
         }
         Self {
             mesh,
-            cells,
+            polygons,
             divided: !own_triangles,
             weight,
             radius: vec![0.0; mesh.vertex_count()],
@@ -57,29 +57,30 @@ impl<'a> Colours<'a> {
     }
 
     /// Colours a component, and returns its size: the distance of its surface from its middle, in the quadratic mean.
-    pub(super) fn colour(&mut self, cells: &[u32], vertices: &[VertexId]) -> f64 {
+    pub(super) fn colour(&mut self, polygons: &[u32], vertices: &[VertexId]) -> f64 {
         let form = Form::new(vertices.iter().map(|v| (self.mesh.position(*v), self.weight[v.index()])));
-        let look = |v: &VertexId| {
+        let colour = |v: &VertexId| {
             let [radius, quantities @ ..] = form.quantities(self.mesh.position(*v));
             (radius, quantities.into_iter().fold(step(radius), |hash, q| joined(hash, step(q))))
         };
-        let looks: Vec<(f64, u64)> = vertices.par_iter().with_min_len(TOGETHER).map(look).collect();
-        for (v, look) in vertices.iter().zip(looks) {
-            (self.radius[v.index()], self.vertex[v.index()]) = look;
+        let coloured: Vec<(f64, u64)> = vertices.par_iter().with_min_len(TOGETHER).map(colour).collect();
+        for (v, at_vertex) in vertices.iter().zip(coloured) {
+            (self.radius[v.index()], self.vertex[v.index()]) = at_vertex;
         }
         let colour = |h: HalfedgeId, sides: usize| {
             let [from, to] = [self.mesh.from(h), self.mesh.to(h)];
             let length = self.mesh.edge_length(h) / form.size;
             let marks = u64::from(self.mesh.is_boundary(h)) + 2 * u64::from(self.mesh.is_guide(h)) + 4 * sides as u64;
-            let division = if self.divided { self.cells.triangles_at(h) } else { 0 };
+            let division = if self.divided { self.polygons.triangles_at(h) } else { 0 };
             let words = [self.vertex[to.index()], step(length), marks, division];
             (h, words.into_iter().fold(self.vertex[from.index()], joined))
         };
-        let of_cell = |&cell: &u32| {
-            let sides = self.cells.faces(cell as usize).len() + 2;
-            self.cells.sides(cell as usize).map(move |h| colour(h, sides))
+        let of_polygon = |&polygon: &u32| {
+            let sides = self.polygons.faces(polygon as usize).len() + 2;
+            self.polygons.sides(polygon as usize).map(move |h| colour(h, sides))
         };
-        let coloured: Vec<(HalfedgeId, u64)> = cells.par_iter().with_min_len(TOGETHER).flat_map_iter(of_cell).collect();
+        let coloured: Vec<(HalfedgeId, u64)> =
+            polygons.par_iter().with_min_len(TOGETHER).flat_map_iter(of_polygon).collect();
         for (h, colour) in coloured {
             self.side[h.index()] = colour;
         }

@@ -14,9 +14,9 @@
 //!    coordinates in it are rounded so far that the rounding of the input does not survive ([`placement`]).
 //! 4. Polygons whose triangles nobody gave are divided anew, each from the side by which it was reached.
 
-mod cells;
 mod colours;
 mod placement;
+mod polygons;
 #[cfg(test)]
 mod tests;
 mod traversal;
@@ -33,8 +33,8 @@ use super::index::{FaceId, HalfedgeId, VertexId};
 use super::tri_mesh::TriMesh;
 use super::triangulate::{Diagonal, halve_quad};
 use crate::progress::{Cancelled, Progress};
-use cells::Cells;
 use colours::Colours;
+use polygons::Polygons;
 use traversal::Traversal;
 
 /// The same surface with its faces, vertices and polygons numbered and placed by its shape alone.
@@ -55,27 +55,27 @@ use traversal::Traversal;
 /// [`Cancelled`] if `progress` says so.
 pub(crate) fn canonical(surface: Surface, progress: &Progress) -> Result<Surface, Cancelled> {
     let mesh = Arc::clone(&surface.mesh);
-    let cells = Cells::new(&mesh, &surface.polygon, &surface.corner);
+    let polygons = Polygons::new(&mesh, &surface.polygon, &surface.corner);
     progress.check()?;
-    let components = Components::new(&mesh, &cells);
-    let features = placement::features(&mesh, &cells);
+    let components = Components::new(&mesh, &polygons);
+    let features = placement::features(&mesh, &polygons);
     progress.check()?;
-    let mut traversal = Traversal::new(&mesh, &cells);
+    let mut traversal = Traversal::new(&mesh, &polygons);
     let mut placed = vec![Point3::origin(); mesh.vertex_count()];
-    let mut colours = Colours::new(&mesh, &cells, surface.own_triangles);
-    let mut parts = Vec::with_capacity(components.cells.len());
-    for (cells, vertices) in components.cells.iter().zip(components.vertices.iter()) {
+    let mut colours = Colours::new(&mesh, &polygons, surface.own_triangles);
+    let mut parts = Vec::with_capacity(components.polygons.len());
+    for (polygons, vertices) in components.polygons.iter().zip(components.vertices.iter()) {
         progress.check()?;
-        let size = colours.colour(cells, vertices);
-        let start = traversal.start(&colours, cells, vertices);
+        let size = colours.colour(polygons, vertices);
+        let start = traversal.start(&colours, polygons, vertices);
         let (order, hash) = traversal.whole(&colours, start);
-        placement::place(&mesh, traversal.cells, &order, vertices, &features, size, &mut placed);
+        placement::place(&mesh, traversal.polygons, &order, vertices, &features, size, &mut placed);
         parts.push(Part { size: colours::step(size), hash, order });
     }
     // Components that agree in all three look the same, and then their order does not matter.
     parts.sort_by_key(|part| (Reverse(part.order.len()), Reverse(part.size), part.hash));
     let order = parts.iter().flat_map(|part| &part.order);
-    assemble(surface, &cells, order, &placed, progress)
+    assemble(surface, &polygons, order, &placed, progress)
 }
 
 /// A component in its new order.
@@ -90,17 +90,17 @@ struct Part {
 
 /// The connected components of a mesh.
 struct Components {
-    cells: Groups<u32>,
+    polygons: Groups<u32>,
     vertices: Groups<VertexId>,
 }
 
 impl Components {
-    fn new(mesh: &TriMesh, cells: &Cells<'_>) -> Self {
+    fn new(mesh: &TriMesh, polygons: &Polygons<'_>) -> Self {
         let (label, count) = mesh.components();
-        let of_cell: Vec<u32> = (0..cells.len()).map(|cell| label[cells.faces(cell).start]).collect();
+        let of_polygon: Vec<u32> = (0..polygons.len()).map(|polygon| label[polygons.faces(polygon).start]).collect();
         let of_vertex: Vec<u32> = mesh.vertices().map(|v| label[mesh.an_outgoing(v).face().index()]).collect();
         Self {
-            cells: Groups::by_label(&of_cell, count, |cell| FaceId::new(cell).index() as u32),
+            polygons: Groups::by_label(&of_polygon, count, |polygon| FaceId::new(polygon).index() as u32),
             vertices: Groups::by_label(&of_vertex, count, VertexId::new),
         }
     }
@@ -110,12 +110,12 @@ impl Components {
 /// of the old mesh is now.
 fn assemble<'a>(
     surface: Surface,
-    cells: &Cells<'_>,
+    polygons: &Polygons<'_>,
     order: impl Iterator<Item = &'a HalfedgeId>,
     placed: &[Point3<f64>],
     progress: &Progress,
 ) -> Result<Surface, Cancelled> {
-    let mut assembly = Assembly::new(&surface, cells, placed);
+    let mut assembly = Assembly::new(&surface, polygons, placed);
     for (number, &entry) in order.enumerate() {
         if number.is_multiple_of(1 << 12) {
             progress.check()?;
@@ -125,11 +125,11 @@ fn assemble<'a>(
     let Assembly { source, corner, twin, polygon, new_side, sides, .. } = assembly;
     let old = &surface.mesh;
     let mut twin = twin;
-    for h in old.halfedges().filter(|&h| cells.is_side(h) && !old.twin(h).is_none()) {
+    for h in old.halfedges().filter(|&h| polygons.is_side(h) && !old.twin(h).is_none()) {
         twin[new_side[h.index()].index()] = new_side[old.twin(h).index()];
     }
     let mut guide = if old.has_guides() { vec![false; twin.len()] } else { Vec::new() };
-    for h in old.halfedges().filter(|&h| old.is_guide(h) && cells.is_side(h)) {
+    for h in old.halfedges().filter(|&h| old.is_guide(h) && polygons.is_side(h)) {
         guide[new_side[h.index()].index()] = true;
     }
     let (mesh, old_vertex) = TriMesh::from_glued(&source, twin, |v| placed[v as usize]);
@@ -141,7 +141,7 @@ fn assemble<'a>(
 /// The arrays of the new mesh as they grow.
 struct Assembly<'a> {
     surface: &'a Surface,
-    cells: &'a Cells<'a>,
+    polygons: &'a Polygons<'a>,
     placed: &'a [Point3<f64>],
     /// The old vertex at each corner.
     source: Vec<u32>,
@@ -162,11 +162,11 @@ struct Assembly<'a> {
 }
 
 impl<'a> Assembly<'a> {
-    fn new(surface: &'a Surface, cells: &'a Cells<'a>, placed: &'a [Point3<f64>]) -> Self {
+    fn new(surface: &'a Surface, polygons: &'a Polygons<'a>, placed: &'a [Point3<f64>]) -> Self {
         let count = surface.mesh.halfedge_count();
         Self {
             surface,
-            cells,
+            polygons,
             placed,
             source: Vec::with_capacity(count),
             corner: Vec::with_capacity(count),
@@ -174,7 +174,7 @@ impl<'a> Assembly<'a> {
             polygon: Vec::with_capacity(count / 3),
             new_side: vec![HalfedgeId::NONE; count],
             has_diagonal: vec![false; count],
-            sides: Vec::with_capacity(cells.len()),
+            sides: Vec::with_capacity(polygons.len()),
             outline: Vec::new(),
             triangles: Vec::new(),
             open: Vec::new(),
@@ -184,7 +184,7 @@ impl<'a> Assembly<'a> {
     /// Appends the polygon that is reached by a side.
     fn add(&mut self, entry: HalfedgeId, progress: &Progress) -> Result<(), Cancelled> {
         self.outline.clear();
-        self.outline.extend(self.cells.around(entry));
+        self.outline.extend(self.polygons.around(entry));
         self.triangles.clear();
         let mesh = &self.surface.mesh;
         match *self.outline {
@@ -210,7 +210,7 @@ impl<'a> Assembly<'a> {
     fn wanted_diagonal(&self, entry: HalfedgeId) -> Diagonal {
         let before = self.surface.mesh.twin(entry);
         let at_second = !before.is_none()
-            && self.cells.is_quad(before)
+            && self.polygons.is_quad(before)
             && !self.new_side[before.index()].is_none()
             && !self.has_diagonal[before.index()];
         if at_second { Diagonal::FromSecond } else { Diagonal::FromFirst }
@@ -219,12 +219,12 @@ impl<'a> Assembly<'a> {
     /// The triangles that the polygon has, by corner counted from the first of the outline, each beginning with its
     /// lowest; ascending.
     fn given_triangles(&mut self) {
-        let Self { surface, cells, outline, triangles, .. } = self;
+        let Self { surface, polygons, outline, triangles, .. } = self;
         let mut place: Vec<(u32, u32)> = outline.iter().zip(0..).map(|(h, i)| (surface.corner[h.index()], i)).collect();
         place.sort_unstable();
         let local =
             |h: HalfedgeId| place.binary_search_by_key(&surface.corner[h.index()], |p| p.0).map_or(0, |at| place[at].1);
-        for f in cells.faces(cells.of(outline[0])) {
+        for f in polygons.faces(polygons.of(outline[0])) {
             let [a, b, c] = FaceId::new(f).halfedges().map(local);
             triangles.push(if a < b && a < c {
                 [a, b, c]

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
-use super::cells::Cells;
+use super::polygons::Polygons;
 use crate::mesh::index::{HalfedgeId, VertexId};
 use crate::mesh::tri_mesh::TriMesh;
 
@@ -32,14 +32,14 @@ const ODD: f64 = 1.234_5;
 
 /// The smallest feature at each vertex: the least height of a corner of a polygon, or the length of a side where that is
 /// straight.
-pub(super) fn features(mesh: &TriMesh, cells: &Cells<'_>) -> Vec<f64> {
+pub(super) fn features(mesh: &TriMesh, polygons: &Polygons<'_>) -> Vec<f64> {
     let corners = |h: HalfedgeId| {
-        let next = cells.next(h);
+        let next = polygons.next(h);
         [mesh.from(h), mesh.from(next), mesh.to(next)]
     };
     let feature = |h: usize| {
         let h = HalfedgeId::new(h);
-        if !cells.is_side(h) {
+        if !polygons.is_side(h) {
             return f64::INFINITY;
         }
         let [a, b, c] = corners(h).map(|v| mesh.position(v));
@@ -58,7 +58,7 @@ pub(super) fn features(mesh: &TriMesh, cells: &Cells<'_>) -> Vec<f64> {
     };
     let of_side: Vec<f64> = (0..mesh.halfedge_count()).into_par_iter().map(feature).collect();
     let mut features = vec![f64::INFINITY; mesh.vertex_count()];
-    for h in mesh.halfedges().filter(|&h| cells.is_side(h)) {
+    for h in mesh.halfedges().filter(|&h| polygons.is_side(h)) {
         for v in corners(h) {
             features[v.index()] = features[v.index()].min(of_side[h.index()]);
         }
@@ -70,14 +70,14 @@ pub(super) fn features(mesh: &TriMesh, cells: &Cells<'_>) -> Vec<f64> {
 /// are reached.
 pub(super) fn place(
     mesh: &TriMesh,
-    cells: &Cells<'_>,
+    polygons: &Polygons<'_>,
     order: &[HalfedgeId],
     vertices: &[VertexId],
     features: &[f64],
     size: f64,
     placed: &mut [Point3<f64>],
 ) {
-    let (origin, axes) = frame(mesh, cells, order);
+    let (origin, axes) = frame(mesh, polygons, order);
     let unit = power_of_two_below(2.0 * ODD * size);
     for v in vertices {
         let feature = power_of_two_below(ODD * FEATURE_SHARE * features[v.index()]);
@@ -90,8 +90,8 @@ pub(super) fn place(
 ///
 /// The axes are along a side of one of the largest polygons and across that polygon. So what is flat and straight there,
 /// and what is parallel or at right angles to it, is so exactly in rounded coordinates, too, and equal lengths are equal.
-fn frame(mesh: &TriMesh, cells: &Cells<'_>, order: &[HalfedgeId]) -> (Point3<f64>, Matrix3<f64>) {
-    let sides = || order.iter().flat_map(|&entry| cells.around(entry));
+fn frame(mesh: &TriMesh, polygons: &Polygons<'_>, order: &[HalfedgeId]) -> (Point3<f64>, Matrix3<f64>) {
+    let sides = || order.iter().flat_map(|&entry| polygons.around(entry));
     let from = |h: HalfedgeId| mesh.position(mesh.from(h));
     let along = |h: HalfedgeId| mesh.position(mesh.to(h)) - from(h);
     let Some(start) = order.first().map(|&h| from(h)) else { return (Point3::origin(), Matrix3::identity()) };
@@ -99,7 +99,7 @@ fn frame(mesh: &TriMesh, cells: &Cells<'_>, order: &[HalfedgeId]) -> (Point3<f64
         return (start, Matrix3::identity());
     };
     let origin = nalgebra::center(&start, &far);
-    let area_vector = |h: HalfedgeId| cells.area_vector(cells.of(h));
+    let area_vector = |h: HalfedgeId| polygons.area_vector(polygons.of(h));
     let area = |h: HalfedgeId| area_vector(h).norm();
     let polygon = first_of_most(order.iter().copied(), area);
     let Some(polygon) = polygon.filter(|&h| area(h) > LEAST_AREA * (far - start).norm_squared()) else {
@@ -109,7 +109,7 @@ fn frame(mesh: &TriMesh, cells: &Cells<'_>, order: &[HalfedgeId]) -> (Point3<f64
     };
     // All that is parallel adds up, so that the rounding of a single small polygon does not tilt the whole.
     let z = sum_of_parallel(area_vector(polygon), order.iter().map(|&h| area_vector(h))).normalize();
-    let side = first_of_most(cells.around(polygon), |h| along(h).norm()).map_or_else(|| far - start, along);
+    let side = first_of_most(polygons.around(polygon), |h| along(h).norm()).map_or_else(|| far - start, along);
     let x = sum_of_parallel(side, sides().map(along));
     let x = (x - z * z.dot(&x)).normalize();
     (origin, Matrix3::from_rows(&[x.transpose(), z.cross(&x).transpose(), z.transpose()]))

@@ -82,10 +82,10 @@ fn same_form(a: &Surface, b: &Surface) -> Result<(), String> {
 
 /// Each side by the input's corners at its ends, with the one beyond.
 fn sides(surface: &Surface) -> BTreeMap<[u32; 2], Option<[u32; 2]>> {
-    let cells = Cells::new(&surface.mesh, &surface.polygon, &surface.corner);
-    let ends = |h: HalfedgeId| [h, cells.next(h)].map(|h| surface.corner[h.index()]);
+    let polygons = Polygons::new(&surface.mesh, &surface.polygon, &surface.corner);
+    let ends = |h: HalfedgeId| [h, polygons.next(h)].map(|h| surface.corner[h.index()]);
     let beyond = |h: HalfedgeId| Some(surface.mesh.twin(h)).filter(|t| !t.is_none()).map(ends);
-    let sides = surface.mesh.halfedges().filter(|&h| cells.is_side(h));
+    let sides = surface.mesh.halfedges().filter(|&h| polygons.is_side(h));
     sides.map(|h| (ends(h), beyond(h))).collect()
 }
 

@@ -1,52 +1,55 @@
 //! The side to start from, and the order of polygons that follows from it.
 
-use super::cells::Cells;
 use super::colours::{Colours, joined};
+use super::polygons::Polygons;
 use crate::mesh::index::{HalfedgeId, VertexId};
 use crate::mesh::tri_mesh::TriMesh;
 
 /// Vertices are as far from the middle as the farthest if they are so by this share of the distance: far above rounding.
 const AS_FAR: f64 = 1.0 - 1e-6;
-/// Sides are compared by what lies around them up to so many polygons, one depth after the other as long as several
-/// look the same,
+/// Numbers of polygons around a side by which sides that look the same are told apart, one after the other.
 const DEPTHS: [usize; 4] = [4, 64, 1024, usize::MAX];
-/// and as long as that takes no more than so many visits for each polygon of the component,
-const VISITS_A_CELL: usize = 16;
-/// and these, which take a millisecond.
+/// Sides that still look the same are compared at the next depth only if that takes at most so many visits for each polygon
+/// of the component, so that the time stays linear, or [`FREE_VISITS`] in all.
+const VISITS_A_POLYGON: usize = 16;
+/// So many visits take a millisecond, and are made however small the component is.
 const FREE_VISITS: usize = 1 << 16;
 
 /// Visits the polygons of a mesh from sides.
 pub(super) struct Traversal<'a> {
     mesh: &'a TriMesh,
-    pub(super) cells: &'a Cells<'a>,
-    /// The visit in which each cell was reached last, and as which one.
+    pub(super) polygons: &'a Polygons<'a>,
+    /// The visit in which each polygon was reached last, and as which one.
     reached: Vec<(u32, u32)>,
     visit: u32,
     queue: Vec<HalfedgeId>,
 }
 
 impl<'a> Traversal<'a> {
-    pub(super) fn new(mesh: &'a TriMesh, cells: &'a Cells<'a>) -> Self {
-        Self { mesh, cells, reached: vec![(0, 0); cells.len()], visit: 0, queue: Vec::new() }
+    pub(super) fn new(mesh: &'a TriMesh, polygons: &'a Polygons<'a>) -> Self {
+        Self { mesh, polygons, reached: vec![(0, 0); polygons.len()], visit: 0, queue: Vec::new() }
     }
 
     /// The side of a component to start from: of those that leave a vertex farthest from the middle one that looks like
     /// the fewest others.
-    pub(super) fn start(&mut self, colours: &Colours<'_>, cells: &[u32], vertices: &[VertexId]) -> HalfedgeId {
+    pub(super) fn start(&mut self, colours: &Colours<'_>, polygons: &[u32], vertices: &[VertexId]) -> HalfedgeId {
         let farthest = vertices.iter().map(|v| colours.radius[v.index()]).fold(0.0, f64::max);
         let is_far = |h: HalfedgeId| colours.radius[self.mesh.from(h).index()] >= AS_FAR * farthest;
-        let sides = cells.iter().flat_map(|&cell| self.cells.sides(cell as usize));
+        let sides = polygons.iter().flat_map(|&polygon| self.polygons.sides(polygon as usize));
         let far = sides.filter(|&h| is_far(h)).map(|h| (colours.of(h), h)).collect();
         let mut alike = rarest(far);
         for depth in DEPTHS {
-            let visits = alike.len().saturating_mul(depth.min(cells.len()));
-            if alike.len() < 2 || visits > VISITS_A_CELL.saturating_mul(cells.len()).saturating_add(FREE_VISITS) {
+            let visits = alike.len().saturating_mul(depth.min(polygons.len()));
+            if alike.len() < 2 || visits > VISITS_A_POLYGON.saturating_mul(polygons.len()).saturating_add(FREE_VISITS) {
                 break;
             }
-            let looks = alike.iter().map(|&h| (self.walk(colours, h, depth), h)).collect();
-            alike = rarest(looks);
+            let told_apart = alike.iter().map(|&h| (self.walk(colours, h, depth), h)).collect();
+            alike = rarest(told_apart);
         }
-        alike.first().copied().unwrap_or_else(|| self.cells.sides(cells[0] as usize).next().unwrap_or(HalfedgeId::NONE))
+        alike
+            .first()
+            .copied()
+            .unwrap_or_else(|| self.polygons.sides(polygons[0] as usize).next().unwrap_or(HalfedgeId::NONE))
     }
 
     /// All polygons of a component by the side by which each is reached, and a hash of what was met on the way.
@@ -64,17 +67,17 @@ impl<'a> Traversal<'a> {
         self.visit += 1;
         self.queue.clear();
         self.queue.push(start);
-        self.reached[self.cells.of(start)] = (self.visit, 0);
+        self.reached[self.polygons.of(start)] = (self.visit, 0);
         let (mut hash, mut head) = (0, 0);
         while let Some(&entry) = self.queue.get(head).filter(|_| head < most) {
             head += 1;
-            for h in self.cells.around(entry) {
+            for h in self.polygons.around(entry) {
                 hash = joined(hash, colours.of(h));
                 let beyond = self.mesh.twin(h);
                 if beyond.is_none() {
                     continue;
                 }
-                let reached = &mut self.reached[self.cells.of(beyond)];
+                let reached = &mut self.reached[self.polygons.of(beyond)];
                 if reached.0 != self.visit {
                     *reached = (self.visit, self.queue.len() as u32);
                     self.queue.push(beyond);

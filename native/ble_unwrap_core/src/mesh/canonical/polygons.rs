@@ -8,20 +8,20 @@ use rayon::prelude::*;
 use crate::mesh::index::{FaceId, HalfedgeId};
 use crate::mesh::tri_mesh::TriMesh;
 
-/// The polygons of a mesh: cells, whose sides are those half-edges that are no diagonals.
-pub(super) struct Cells<'a> {
+/// The polygons of a mesh, whose sides are those half-edges that are no diagonals.
+pub(super) struct Polygons<'a> {
     mesh: &'a TriMesh,
-    /// The cell of each face; ascending.
+    /// The polygon of each face; ascending.
     of_face: Vec<u32>,
-    /// The first face of each cell, and the number of faces.
+    /// The first face of each polygon, and the number of faces.
     first: Vec<u32>,
     /// The side after each side; none for diagonals.
     next: Vec<HalfedgeId>,
-    /// The area of each cell along its mean normal.
+    /// The area of each polygon along its mean normal.
     area: Vec<Vector3<f64>>,
 }
 
-impl<'a> Cells<'a> {
+impl<'a> Polygons<'a> {
     /// `polygon` names the polygon of each face, ascending, and `corner` its corner of each half-edge, of which a polygon
     /// has none twice.
     pub(super) fn new(mesh: &'a TriMesh, polygon: &[u32], corner: &[u32]) -> Self {
@@ -54,27 +54,27 @@ impl<'a> Cells<'a> {
             next
         };
         let next = (0..mesh.halfedge_count()).into_par_iter().map(|h| after(HalfedgeId::new(h))).collect();
-        let mut cells = Self { mesh, of_face, first, next, area: Vec::new() };
-        cells.area = (0..cells.len()).into_par_iter().map(|cell| cells.area_of(cell)).collect();
-        cells
+        let mut polygons = Self { mesh, of_face, first, next, area: Vec::new() };
+        polygons.area = (0..polygons.len()).into_par_iter().map(|polygon| polygons.area_of(polygon)).collect();
+        polygons
     }
 
-    /// Number of cells.
+    /// Number of polygons.
     pub(super) fn len(&self) -> usize {
         self.first.len() - 1
     }
 
-    /// The faces of a cell.
-    pub(super) fn faces(&self, cell: usize) -> Range<usize> {
-        self.first[cell] as usize..self.first[cell + 1] as usize
+    /// The faces of a polygon.
+    pub(super) fn faces(&self, polygon: usize) -> Range<usize> {
+        self.first[polygon] as usize..self.first[polygon + 1] as usize
     }
 
-    /// The cell of a half-edge.
+    /// The polygon of a half-edge.
     pub(super) fn of(&self, h: HalfedgeId) -> usize {
         self.of_face[h.face().index()] as usize
     }
 
-    /// Whether the cell of a half-edge has four sides.
+    /// Whether the polygon of a half-edge has four sides.
     pub(super) fn is_quad(&self, h: HalfedgeId) -> bool {
         self.faces(self.of(h)).len() == 2
     }
@@ -89,26 +89,26 @@ impl<'a> Cells<'a> {
         self.next[h.index()]
     }
 
-    /// The sides of a cell in order, from one of them.
+    /// The sides of a polygon in order, from one of them.
     pub(super) fn around(&self, first: HalfedgeId) -> impl Iterator<Item = HalfedgeId> + Clone {
         let count = self.faces(self.of(first)).len() + 2;
         std::iter::successors(Some(first), |&h| Some(self.next(h))).take(count)
     }
 
-    /// All sides of a cell, in order.
-    pub(super) fn sides(&self, cell: usize) -> impl Iterator<Item = HalfedgeId> + '_ {
-        let halfedges = self.faces(cell).flat_map(|f| FaceId::new(f).halfedges());
+    /// All sides of a polygon, in order.
+    pub(super) fn sides(&self, polygon: usize) -> impl Iterator<Item = HalfedgeId> + '_ {
+        let halfedges = self.faces(polygon).flat_map(|f| FaceId::new(f).halfedges());
         let first = halfedges.into_iter().find(|&h| self.is_side(h));
         first.into_iter().flat_map(|first| self.around(first))
     }
 
-    /// The area of a cell along its mean normal, which is that of its outline, however it is divided.
-    pub(super) fn area_vector(&self, cell: usize) -> Vector3<f64> {
-        self.area[cell]
+    /// The area of a polygon along its mean normal, which is that of its outline, however it is divided.
+    pub(super) fn area_vector(&self, polygon: usize) -> Vector3<f64> {
+        self.area[polygon]
     }
 
-    fn area_of(&self, cell: usize) -> Vector3<f64> {
-        let Some(first) = self.sides(cell).next() else { return Vector3::zeros() };
+    fn area_of(&self, polygon: usize) -> Vector3<f64> {
+        let Some(first) = self.sides(polygon).next() else { return Vector3::zeros() };
         let origin = self.mesh.position(self.mesh.from(first));
         let (mut sum, mut before) = (Vector3::zeros(), Vector3::zeros());
         for h in self.around(first) {
@@ -119,8 +119,8 @@ impl<'a> Cells<'a> {
         sum
     }
 
-    /// How many triangles of its cell meet at the corner that a side leaves: with the cell's other corners, this says how
-    /// it is divided.
+    /// How many triangles of its polygon meet at the corner that a side leaves: with its other corners, this says how
+    /// the polygon is divided.
     pub(super) fn triangles_at(&self, side: HalfedgeId) -> u64 {
         let mut count = 1;
         let mut h = side.prev();
