@@ -15,8 +15,10 @@ sys.path.insert(0, str(ROOT / "native/paper"))
 
 import commit  # noqa: E402
 import compare  # noqa: E402
+import notched  # noqa: E402
 import page  # noqa: E402
 import publish  # noqa: E402
+import rivals  # noqa: E402
 import shapes  # noqa: E402
 
 CAMELHEAD = ROOT.parent / "shared/models/camelhead.obj"
@@ -170,6 +172,48 @@ def test_the_real_camel_head():
         # Both near 1, and by turns the nearer one: the stretch is what tells them apart.
         assert default.report["distance_correlation_before"] >= isomap.report["distance_correlation_before"] - 1e-3
         assert default.report["flips_after"] == 0 == isomap.report["flips_after"]
+
+
+def _edges(mesh):
+    return np.concatenate([np.stack([p, np.roll(p, -1)], axis=1) for p in mesh.polygons()])
+
+
+def test_surfaces_with_notches_are_open_and_each_is_another():
+    surfaces = list(notched.surfaces(24))
+    assert len(surfaces) >= 40 and len({mesh.name for mesh in surfaces}) == len(surfaces)
+    for mesh in surfaces:
+        forward = [tuple(edge) for edge in _edges(mesh).tolist()]
+        known = set(forward)
+        assert len(known) == len(forward), mesh.name
+        assert any((b, a) not in known for a, b in forward), "it has a boundary"
+        assert np.isfinite(mesh.positions).all()
+
+
+def test_where_distances_go_round_the_model_makes_fewer_charts_than_isomap():
+    """Sheets round whose notches geodesics go: BLE lays them flat in one piece, classical scaling folds them."""
+    chosen = ("comb of 3", "ring with a gap, 0.55", "ramp of 1.5", "ramp of 2.5")
+    found = [mesh for mesh in notched.surfaces() if mesh.name in chosen]
+    assert len(found) == len(chosen)
+    rows = [row for mesh in found for row in rivals.compared("notched", mesh, [1.1], ["0"])]
+    assert all(row[model]["flips"] + row[model]["overlaps"] == 0 for row in rows for model in rivals.MODELS)
+    charts = {row["mesh"]: [row[model]["charts"] for model in rivals.MODELS] for row in rows}
+    assert all(ours <= theirs for ours, theirs in charts.values()), charts
+    assert sum(ours for ours, _ in charts.values()) < sum(theirs for _, theirs in charts.values()), charts
+
+
+def test_a_ratio_counts_each_mesh_once_and_leaves_out_what_has_no_seam():
+    def row(mesh, seams, settings="limit 1.1, stretch price 0"):
+        figures = [{"charts": 2, "seam_length": seam, "l2": 1.0, "excess": 0.1, "cpu": 1.0} for seam in seams]
+        return {"kind": "kind", "mesh": mesh, "settings": settings, **dict(zip(rivals.MODELS, figures, strict=True))}
+
+    rows = [row("a", (1.0, 2.0)), row("a", (2.0, 4.0), "other"), row("b", (4.0, 4.0)), row("c", (0.0, 1.0))]
+    mean, error, meshes = rivals.ratio(rows, "seam_length")
+    assert meshes == 2 and mean == pytest.approx(0.5**0.5)
+    assert error == pytest.approx(0.5**0.5 * np.log(2) / 2)
+    assert rivals.ratio(rows[3:], "seam_length") is None and rivals.alike(rows) == 1
+    lines = rivals.table(rows).splitlines()
+    assert len(lines) == 5 and len({line.count("|") for line in lines}) == 1
+    assert "0.707 ± 0.245" in lines[-1] and "| 4 | 1 | 8 and 8 |" in lines[-1]
 
 
 # The page -----------------------------------------------------------------------------------------------------------

@@ -31,6 +31,7 @@ import measure
 import numpy as np
 import page
 import publish
+import rivals
 import shapes
 
 RUNS = 7  # of an embedding whose time is given: the best counts
@@ -168,6 +169,8 @@ def main():
     say("the table: three methods on the same charts")
     charts = {mesh.name: compare.compare_charts(mesh) for mesh in models}
     presets = [] if options.quick else variants(models if options.models else shapes.complex_models(0.085))
+    say("whole atlases by BLE and by Isomap")
+    pairs = rivals.measured(rivals.generated(options.quick), say=say)
     say("time against size")
     sizes = measure.SIZES[:3] if options.quick else measure.SIZES
     surfaces, points = measure.time_of_surfaces(sizes), measure.time_of_points(sizes)
@@ -187,6 +190,7 @@ def main():
         by_landmarks=by_landmarks,
         charts=charts,
         presets=presets,
+        pairs=pairs,
         surfaces=surfaces,
         points=points,
         trust=trust,
@@ -200,7 +204,10 @@ def main():
     if options.publish:
         publish.publish(out, HERE)
         say(f"brought native/paper up to date ({figures.total_size(HERE / 'pictures') / 1e6:.2f} MB of pictures)")
-    print(compare.patch_table(patches), compare.chart_table(charts), f"written to {out}", sep="\n\n")
+    (out / "rivals.json").write_text(json.dumps(pairs, indent=1), encoding="utf-8")
+    print(
+        compare.patch_table(patches), compare.chart_table(charts), rivals.table(pairs), f"written to {out}", sep="\n\n"
+    )
     return 0
 
 
