@@ -4,9 +4,9 @@ use crate::distortion::RestTriangle;
 use crate::linalg::{SparseCholesky, SparseError, SparsePattern};
 use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 
-/// Cotangent weights are kept within these bounds: positive, so that solutions peak only where there is a source and few
+/// Weights are kept within these bounds: positive, so that solutions peak only where there is a source and few
 /// triangles flip, and well conditioned.
-const WEIGHTS: (f64, f64) = (0.05, 20.0);
+pub(super) const WEIGHTS: (f64, f64) = (0.05, 20.0);
 /// Relative weight on the diagonal, against the shift that is left open where nothing is held.
 const RIDGE: f64 = 1e-10;
 

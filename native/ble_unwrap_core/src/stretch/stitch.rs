@@ -1,19 +1,24 @@
 //! Triangles drawn apart in the plane, drawn together as one map.
 //!
-//! Where two flat charts are laid side by side their borders do not quite meet. Here each triangle keeps its shape and its
-//! turn as well as the others let it: Poisson's equation with their Jacobians for a right-hand side, which
-//! spreads what does not meet over the whole map. To go on from there as rigidly as possible, each triangle turning its shape
-//! on the surface, was tried: it folds more than it gains.
+//! Where two flat charts are laid side by side, or a cut is closed, the borders do not quite meet. What does not meet is spread
+//! over the whole map by Poisson's equation, with the Jacobians of the triangles for a right-hand side. A border that opens by
+//! more than half a radian folds so: there the angles between the two drawings of each edge are spread first, by another
+//! equation of the kind, which gives every triangle a turn. To go on from there as rigidly as possible, each triangle turning its
+//! shape on the surface, was tried: it folds more than it gains.
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Rotation2};
 
 use super::StretchError;
-use super::laplacian::Laplacian;
+use super::laplacian::{Laplacian, WEIGHTS};
 use crate::distortion::RestTriangle;
-use crate::mesh::TriMesh;
+use crate::linalg::{SparseCholesky, SparseError, SparsePattern};
+use crate::mesh::{HalfedgeId, TriMesh};
 
-/// Positions that draw each face as near as can be to its three corners in `drawn`, by the lengths of their sides weighted
-/// with cotangents. May have flips and overlap. O(n^1.5).
+/// Relative weight on the diagonal, against the turn of the whole, which is left open.
+const RIDGE: f64 = 1e-10;
+
+/// Positions that draw each face as near as can be to its three corners in `drawn`, by the lengths of their sides weighted with
+/// cotangents. May have flips and overlap. O(n^1.5).
 ///
 /// # Errors
 /// [`StretchError::Solver`] where the system cannot be factored.
@@ -39,11 +44,61 @@ pub(crate) fn stitch(
     Ok((0..n).map(|i| Point2::new(rhs[i], rhs[n + i])).collect())
 }
 
+/// The same, each face turned first so that the two drawings of an edge point the same way as nearly as can be. O(n^1.5).
+///
+/// # Errors
+/// [`StretchError::Solver`] where a system cannot be factored.
+pub(crate) fn stitch_turned(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    drawn: &[[Point2<f64>; 3]],
+) -> Result<Vec<Point2<f64>>, StretchError> {
+    let turn = |(corners, turn): (&[Point2<f64>; 3], f64)| corners.map(|p| Rotation2::new(turn) * p);
+    let turned: Vec<_> = drawn.iter().zip(turns(mesh, rest, drawn)?).map(turn).collect();
+    stitch(mesh, rest, &turned)
+}
+
+/// By how much each face is turned, in radians: what the two drawings of each edge differ by, spread over all faces by least squares,
+/// with the length of the edge over the distance between its faces for a weight.
+fn turns(mesh: &TriMesh, rest: &[RestTriangle], drawn: &[[Point2<f64>; 3]]) -> Result<Vec<f64>, SparseError> {
+    let inner = || mesh.edges().filter(|&h| !mesh.is_boundary(h)).map(|h| (h, mesh.twin(h)));
+    let faces = |(h, t): (HalfedgeId, HalfedgeId)| [h.face().index(), t.face().index()];
+    let pairs = inner().map(faces).filter(|[f, g]| f != g).map(|[f, g]| (f as u32, g as u32));
+    let mut solver = SparseCholesky::analyse(SparsePattern::from_pairs(mesh.face_count(), pairs))?;
+    let mut values = vec![0.0; solver.pattern().entry_count()];
+    let mut turns = vec![0.0; mesh.face_count()];
+    let side = |f: usize, slot: usize| drawn[f][(slot + 1) % 3] - drawn[f][slot];
+    for (h, t) in inner() {
+        let [f, g] = faces((h, t));
+        let Some(at) = solver.pattern().position(f, g).filter(|_| f != g) else { continue };
+        let (here, there) = (side(f, h.slot()), -side(g, t.slot()));
+        let angle = here.perp(&there).atan2(here.dot(&there));
+        let weight = mesh.edge_length(h).powi(2) / (rest[f].area() + rest[g].area());
+        let weight = if weight.is_nan() { WEIGHTS.0 } else { weight.clamp(WEIGHTS.0, WEIGHTS.1) };
+        values[at] -= weight;
+        for face in [f, g] {
+            values[solver.pattern().diagonal(face)] += weight;
+        }
+        turns[f] += weight * angle;
+        turns[g] -= weight * angle;
+    }
+    for face in 0..mesh.face_count() {
+        let at = solver.pattern().diagonal(face);
+        values[at] = values[at] * (1.0 + RIDGE) + RIDGE;
+    }
+    solver.refactor(&values)?;
+    solver.solve_in_place(&mut turns);
+    Ok(turns)
+}
+
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
     use crate::stretch::test_meshes::{grid, hemisphere};
-    use nalgebra::{Point3, Rotation2, Vector2};
+    use crate::stretch::{first_flip, l2_of_positions};
+    use nalgebra::{Point3, Vector2};
 
     #[test]
     fn a_map_drawn_whole_stays_up_to_a_shift() {
@@ -72,6 +127,43 @@ mod tests {
             let (i, j) = (mesh.from(h).index(), mesh.to(h).index());
             let length = (got[i] - got[j]).norm() / mesh.edge_length(h);
             assert!((length - 1.0).abs() < 0.1, "the gap of half an edge and more is spread: {length}");
+        }
+    }
+
+    /// A cone whose apex lacks an angle, cut open along a line from the apex and rolled out, is closed again.
+    #[test]
+    fn a_cut_that_opens_wide_is_closed_without_a_fold() {
+        let (rings, around) = (8_usize, 24_usize);
+        for opening in [0.5, 1.5, 2.5] {
+            let developed = TAU - opening;
+            let place = |ring: usize, k: usize| {
+                let (r, angle) = (ring as f64, TAU * k as f64 / around as f64);
+                let radius = r * developed / TAU;
+                Point3::new(radius * angle.cos(), radius * angle.sin(), -(r * r - radius * radius).sqrt())
+            };
+            let mut positions = vec![Point3::origin()];
+            positions.extend((1..=rings).flat_map(|ring| (0..around).map(move |k| place(ring, k))));
+            let at = |ring: usize, k: usize| if ring == 0 { 0 } else { (1 + (ring - 1) * around + k % around) as u32 };
+            let flat = |ring: usize, k: usize| {
+                let angle = developed * k as f64 / around as f64;
+                Point2::new(ring as f64 * angle.cos(), ring as f64 * angle.sin())
+            };
+            let (mut triangles, mut drawn) = (Vec::new(), Vec::new());
+            let mut add = |corners: [(usize, usize); 3]| {
+                triangles.push(corners.map(|(ring, k)| at(ring, k)));
+                drawn.push(corners.map(|(ring, k)| flat(ring, k)));
+            };
+            for k in 0..around {
+                add([(0, k), (1, k), (1, k + 1)]);
+                for ring in 1..rings {
+                    add([(ring, k), (ring + 1, k), (ring + 1, k + 1)]);
+                    add([(ring, k), (ring + 1, k + 1), (ring, k + 1)]);
+                }
+            }
+            let mesh = TriMesh::from_triangles(&positions, &triangles).0;
+            let uv = stitch_turned(&mesh, &RestTriangle::of_mesh(&mesh), &drawn).expect("factored");
+            assert_eq!(first_flip(&mesh, &uv), None, "a cut that opens by {opening}");
+            assert!(l2_of_positions(&mesh, &uv, 1e-12) < 1.0 + 0.1 * opening * opening, "{opening}");
         }
     }
 }
