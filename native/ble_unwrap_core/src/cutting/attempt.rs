@@ -1,7 +1,6 @@
 //! One patch as one chart: the attempts that are made at it, the cheapest first.
 
 use std::borrow::Cow;
-use std::cell::LazyCell;
 
 use crate::cache::Run;
 use crate::charts::{self, Chart, Patch};
@@ -12,6 +11,7 @@ use crate::progress::Cancelled;
 use crate::segmentation::SpectralAnalysis;
 use crate::settings::{Holes, Moves, Settings};
 
+use super::cost;
 use super::measured::{Measured, analyse};
 use super::moves::dart::Bulging;
 use super::moves::{net, split};
@@ -67,15 +67,16 @@ impl<'a> Attempt<'a> {
     /// As it is if its topology allows, else, or if that does not do, cut open.
     pub(super) fn run(&self, rungs: &mut Rungs) -> Result<Option<Chart>, Cancelled> {
         let patch = self.patch();
-        let bulging = LazyCell::new(|| self.bulging(Cow::Borrowed(patch)));
-        if self.topology.is_chart() && (self.settings.holes == Holes::Keep || self.topology.loops == 1) {
-            if let Some(flat) = flattening::isometric(patch, rungs) {
-                return Ok(Some(flat.into_chart(patch.clone())));
-            }
+        let may_be_chart = self.topology.is_chart() && (self.settings.holes == Holes::Keep || self.topology.loops == 1);
+        let is_closed = self.topology.loops == 0 && self.topology.genus() == 0;
+        if may_be_chart && let Some(flat) = flattening::isometric(patch, rungs) {
+            return Ok(Some(flat.into_chart(patch.clone())));
+        }
+        if may_be_chart || is_closed {
             if let Some(chart) = self.net(rungs) {
                 return Ok(Some(chart));
             }
-            if self.settings.stretch_price > 0.0 {
+            if !cost::may_bend(self.settings.stretch_price) {
                 if let Some(chart) = self.unrolled(rungs) {
                     return Ok(Some(chart));
                 }
@@ -83,11 +84,16 @@ impl<'a> Attempt<'a> {
                     return Ok(None);
                 }
             }
-            let flattened = match flattening::projected(patch, self.settings, rungs, self.run)? {
-                Some(verdict) => verdict,
-                None if bulging.as_ref().map_err(|c| *c)?.as_ref().is_some_and(|r| !r.is_promising()) => {
-                    Flattened::Refused
-                }
+            let projected =
+                if is_closed { None } else { flattening::projected(patch, self.settings, rungs, self.run)? };
+            if let Some(Flattened::Flat(flat)) = projected {
+                return Ok(Some(flat.into_chart(patch.clone())));
+            }
+            let bulging = self.bulging(Cow::Borrowed(patch))?;
+            let is_hopeless = is_closed || bulging.as_ref().is_some_and(|bulging| !bulging.is_promising());
+            let flattened = match projected {
+                Some(flattened) => flattened,
+                None if is_hopeless => Flattened::Refused,
                 None => {
                     let (distances, analysis) = self.measured.analysis()?;
                     self.flatten(patch, distances, analysis, rungs)?
@@ -95,23 +101,12 @@ impl<'a> Attempt<'a> {
             };
             let chart = match flattened {
                 Flattened::Flat(flat) => return Ok(Some(flat.into_chart(patch.clone()))),
-                Flattened::Near(uv) => self.with_darts((*bulging).clone()?, uv, rungs)?,
-                Flattened::Refused => self.cut_by_darts((*bulging).clone()?, rungs)?,
+                Flattened::Near(uv) => self.with_darts(bulging, uv, rungs)?,
+                Flattened::Refused => self.cut_by_darts(bulging, rungs)?,
             };
-            if chart.is_some() {
+            if chart.is_some() || is_closed {
                 return Ok(chart);
             }
-        }
-        // A few faces are not worth a cut.
-        let blob = self.topology.loops == 0 && self.topology.genus() == 0;
-        if blob {
-            if let Some(chart) = self.net(rungs) {
-                return Ok(Some(chart));
-            }
-            if self.settings.stretch_price > 0.0 && split::unrolling_parts(patch, self.settings).is_some() {
-                return Ok(None);
-            }
-            return self.cut_by_darts((*bulging).clone()?, rungs);
         }
         if self.topology.is_disk() || patch.faces.len() < LEAST_FACES_TO_CUT {
             return Ok(None);

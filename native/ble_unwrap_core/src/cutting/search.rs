@@ -79,8 +79,8 @@ fn disjoint(mut sites: Vec<Site>) -> Vec<Site> {
     sites
 }
 
-/// What comes of a move at a site: the first of its ways that makes charts, and where there is a price, is worth it. One with a
-/// bad start tells that another may do.
+/// What comes of a move at a site: the first of its ways that makes charts, and where there is a price, is worth it; the moves of the
+/// search glue, so that one chart takes the place of all. One with a bad start tells that another may do.
 pub(super) fn tried(
     cutting: &Cutting<'_>,
     made: &dyn Move,
@@ -93,7 +93,10 @@ pub(super) fn tried(
     let mut verdict = Verdict::Refused;
     let old: Vec<&Chart> = site.charts.iter().filter_map(|&id| cutting.chart(id)).collect();
     for way in made.ways(cutting, site, run)? {
-        match trial(cutting, &way, settings, &mut rungs, run)? {
+        let glued = way.edit.glued_length(cutting);
+        let stretch_limit = price.map_or(settings.stretch_limit, |price| price.limit_of_union(&old, glued, settings));
+        let under_price = Settings { stretch_limit, ..settings.clone() };
+        match trial(cutting, &way, &under_price, &mut rungs, run)? {
             Verdict::Refused => (),
             Verdict::BadStart => verdict = Verdict::BadStart,
             Verdict::Charts(charts) => {

@@ -9,8 +9,8 @@ mod rungs;
 mod steps;
 
 pub(crate) use ladder::{
-    Flattened, NEGLIGIBLE, Polished, Positions, flatten, flatten_apart, is_sharp, isometric, l2, opened, part_of_chart,
-    polish, projected, sewn,
+    Flattened, Polished, Positions, flatten, flatten_apart, isometric, l2, lying, opened, part_of_chart, polish,
+    projected, sewn,
 };
 pub(crate) use polygon::{flatten_polygon, thicken};
 pub(crate) use rungs::{Rung, Rungs};

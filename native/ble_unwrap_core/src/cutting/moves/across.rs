@@ -15,30 +15,18 @@ use crate::progress::Cancelled;
 use crate::segmentation;
 use crate::settings::Settings;
 
+use super::super::cost;
 use super::super::edit::Edit;
 use super::super::state::{ChartId, Cutting};
 use super::super::trial::{Verdict, trial};
 use super::{Proposal, Start};
 
-/// A chart is cut if a texture that holds it, whatever its turn, can be filled to no more than this share by all charts.
-const LEAST_FILL: f64 = 0.25;
-/// The same for a body that was cut open, with seams all round: there one more shows less than across a plank. Over 16 models 0.25,
-/// 0.4 and 0.5 give 3.18, 3.36 and 3.78 charts, seams of 3.20, 3.24 and 3.36 (geometric means), and fill 0.546, 0.567 and 0.584 of
-/// the texture.
-const LEAST_FILL_OF_BODIES: f64 = 0.4;
-/// A body that was cut open borders on itself along at least this share of its boundary.
-const LEAST_SELF_BORDER: f64 = 0.5;
-/// A chart that is cut at all, and its parts, are cut until a texture that holds them can be filled to this share.
-const GOOD_FILL: f64 = 0.6;
 /// The cut runs in so much of the length around the middle.
 const MIDDLE: [f64; 2] = [0.4, 0.6];
 /// A cut is no longer than so many times the mean width of the chart, its area over its length: a straight one across a strip is
 /// as long as that, and one along the sides of a triangulation up to about 1.4 times. What is longer runs along the chart, as
 /// the diagonals of triangles do that are as long as the chart itself.
 const MOST_CUT: f64 = 1.5;
-/// A cut is worth its seam if a texture that holds the parts needs at most this share of the length of one that holds the chart. A cut in
-/// the middle of a strip comes to 0.5 to 0.6.
-const LEAST_GAIN: f64 = 0.9;
 /// Turns tried, of a half one.
 const DIRECTIONS: usize = 24;
 /// Cuts in two, one after the other, that a part comes out of at most.
@@ -58,21 +46,17 @@ pub(crate) fn cut_across(
     let texture = [settings.packing.width, settings.packing.height].map(f64::from);
     let most_filled = |chart: &Chart| area / (texture[0] * texture[1] * hold(&chart.uv, texture).powi(2));
     let mut cutting = Cutting::new(mesh, polygon, charts);
-    let is_too_long = |chart: &Chart| {
-        let least = if self_border(chart) > LEAST_SELF_BORDER { LEAST_FILL_OF_BODIES } else { LEAST_FILL };
-        most_filled(chart) <= least
-    };
+    let is_too_long = |chart: &Chart| cost::fill_asks_for_a_cut(most_filled(chart), self_border(chart));
     let too_long = |id: &ChartId| cutting.chart(*id).is_some_and(is_too_long);
     let mut open: Vec<(ChartId, usize)> = cutting.ids().filter(too_long).map(|id| (id, 0)).collect();
     while let Some((id, cuts)) = open.pop() {
         run.progress.check()?;
-        let Some(chart) = cutting.chart(id).filter(|chart| cuts < MOST_CUTS && most_filled(chart) <= GOOD_FILL) else {
-            continue;
-        };
-        let largest = LEAST_GAIN * hold(&chart.uv, texture);
+        let is_open = |chart: &&Chart| cuts < MOST_CUTS && cost::fill_asks_for_another_cut(most_filled(chart));
+        let Some(chart) = cutting.chart(id).filter(is_open) else { continue };
+        let before = hold(&chart.uv, texture);
         let Some(proposal) = proposal(&cutting, chart, settings, run)? else { continue };
         if let Verdict::Charts(parts) = trial(&cutting, &proposal, settings, rungs, run)?
-            && parts.iter().all(|part| hold(&part.uv, texture) <= largest)
+            && cost::fills_better(before, parts.iter().map(|part| hold(&part.uv, texture)))
         {
             rungs.take(Rung::Split);
             open.extend(cutting.replace(&[id], parts).into_iter().map(|part| (part, cuts + 1)));

@@ -17,6 +17,7 @@ use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use crate::progress::Cancelled;
 use crate::settings::{Moves, Settings};
 
+use super::super::cost;
 use super::super::edit::Edit;
 use super::super::state::{Corners, Cutting};
 use super::super::trial::{Verdict, trial};
@@ -36,10 +37,6 @@ const LARGEST: usize = 256;
 const MOST_BEGINNINGS: usize = 8;
 /// Ways to hand over the same polygons that are tried.
 const MOST_WAYS: usize = 3;
-/// It pays where the logarithm of the stretch that it began at falls by so many times the share of the chart's boundary that is
-/// added to the border: a third less stretch for 1 % more of it.
-const PRICE: f64 = 40.0;
-
 /// The charts with their squeezed polygons handed over. They are made of faces of `mesh` and come sorted by lowest face; those
 /// under the limit stay so, the L2 stretch of all together does not rise, all stay injective, and edges of guides stay borders.
 /// At most 2 · [`MOST_BEGINNINGS`] · [`MOST_WAYS`] trials a chart, each O(n log n) in the faces of two charts; mostly none.
@@ -187,7 +184,7 @@ impl Borders<'_> {
         let owner = faces.first().and_then(|f| self.cutting.owner(*f));
         let Some(chart) = owner.and_then(|id| self.cutting.chart(id)) else { return false };
         let added = (self.length(&self.cut_off(faces)) - self.length(way)) / chart.patch.mesh.boundary_length();
-        after < before && (before / after).ln() >= PRICE * added
+        cost::lowers_peak(before, after, added)
     }
 
     /// Faces cut off, glued along a way, and unfolded there. `None` where that cannot pay, or would leave nothing of their chart.
@@ -257,7 +254,7 @@ fn is_in(faces: &[FaceId], face: FaceId) -> bool {
 mod tests {
     use super::*;
     use crate::charts::Patch;
-    use crate::flattening::{self, NEGLIGIBLE};
+    use crate::flattening;
     use crate::mesh::VertexId;
     use crate::mesh::test_surfaces;
     use crate::progress::Progress;
@@ -266,6 +263,10 @@ mod tests {
 
     /// Positions along x and y of a vertex in the plane.
     type Place<'a> = &'a dyn Fn(Point3<f64>) -> Point2<f64>;
+
+    fn l2(patch: &Patch, uv: &[Point2<f64>]) -> f64 {
+        flattening::l2(patch, &RestTriangle::of_mesh(&patch.mesh), uv)
+    }
 
     fn flat(p: Point3<f64>) -> Point2<f64> {
         p.xy()
@@ -297,7 +298,7 @@ mod tests {
 
     fn drawn_as(patch: Patch, place: Place<'_>) -> Chart {
         let uv: Vec<_> = patch.mesh.positions().iter().map(|&p| place(p)).collect();
-        let l2 = stretch::l2_of_positions(&patch.mesh, &uv, NEGLIGIBLE);
+        let l2 = l2(&patch, &uv);
         Chart { patch, uv, l2 }
     }
 
@@ -322,7 +323,7 @@ mod tests {
             assert!(chart.patch.mesh.topology().is_chart());
             assert_eq!(stretch::first_flip(&chart.patch.mesh, &chart.uv), None);
             assert!(stretch::boundary_is_simple(&chart.patch.mesh, &chart.uv));
-            assert_eq!(chart.l2, stretch::l2_of_positions(&chart.patch.mesh, &chart.uv, NEGLIGIBLE));
+            assert_eq!(chart.l2, l2(&chart.patch, &chart.uv));
             assert!(chart.l2 <= settings.stretch_limit);
         }
         (charts, rungs.taken().iter().find(|(name, _)| *name == "recut").map_or(0, |r| r.1))
@@ -383,7 +384,7 @@ mod tests {
         let across = mesh.edge_length(mesh.outgoing(VertexId::new(0)).next().expect("an edge"));
         let to_centre = (centre - chart.uv[v.index()].coords).normalize();
         chart.uv[v.index()] += 0.75 * across * to_centre;
-        chart.l2 = stretch::l2_of_positions(&chart.patch.mesh, &chart.uv, NEGLIGIBLE);
+        chart.l2 = l2(&chart.patch, &chart.uv);
         let before = vec![chart];
         assert!(worst(&before) > 2.5, "{}", worst(&before));
         let (after, times) = all_handed_over(&mesh, &all, before.clone(), &settings());

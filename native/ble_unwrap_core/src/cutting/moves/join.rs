@@ -163,10 +163,12 @@ impl Move for JoinAnew<'_> {
         if self.refused.contains(&faces) {
             return Ok(Vec::new());
         }
-        let [a, b] = site.charts[..] else { return Ok(Vec::new()) };
-        let glue: Vec<HalfedgeId> =
-            border::runs(cutting, a, |other| other == b).into_iter().flat_map(|run| run.edges).collect();
-        Ok(vec![Proposal { edit: Edit::new(cutting.mesh(), &glue, &[]), start: Start::Anew }])
+        let mesh = cutting.mesh();
+        // Cuts inside the two charts are glued, too: it is for the embedding to say where the union is cut.
+        let is_inside = |h: &HalfedgeId| cutting.is_seam(*h) && faces.binary_search(&mesh.twin(*h).face()).is_ok();
+        let sides = faces.iter().flat_map(|f| f.halfedges()).filter(|&h| !mesh.is_boundary(h));
+        let glue: Vec<HalfedgeId> = sides.filter(is_inside).collect();
+        Ok(vec![Proposal { edit: Edit::new(mesh, &glue, &[]), start: Start::Anew }])
     }
 }
 
@@ -280,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn a_union_embedded_with_darts_may_not_lengthen_the_seam() {
+    fn a_union_embedded_with_darts_lengthens_the_seam_only_for_what_it_saves() {
         // The border of a small cap is shorter than any cut that opens the ball.
         let ball = test_surfaces::sphere(3);
         let polygon: Vec<u32> = (0..ball.face_count() as u32).collect();
@@ -301,13 +303,15 @@ mod tests {
         assert!(seam(&one) > sides.iter().map(seam).sum());
         let cutting = Cutting::new(&ball, &polygon, sides.to_vec());
         let (which, none) = (Which::EVERY, Refused::default());
-        let site = Join { which }
-            .sites(&cutting, &History::default(), &Price::new(&ball, &settings))
-            .pop()
-            .expect("neighbours");
-        let anew = JoinAnew { which, refused: &none };
-        let joined = tried(&cutting, &anew, &site, None, &settings, &run).expect("not cancelled").0;
-        assert!(matches!(joined, Verdict::Refused));
+        for stretch_price in [0.0, 20.0] {
+            let settings = Settings { stretch_price, ..Settings::default() };
+            let price = Price::new(&ball, &settings);
+            let site = Join { which }.sites(&cutting, &History::default(), &price).pop().expect("neighbours");
+            let anew = JoinAnew { which, refused: &none };
+            let joined = tried(&cutting, &anew, &site, Some(&price), &settings, &run).expect("not cancelled").0;
+            // The chart that it saves is worth the seam, but not what the union is stretched, where that has a price.
+            assert_eq!(matches!(joined, Verdict::Charts(_)), stretch_price == 0.0);
+        }
     }
 
     /// The faces of a sheet with their middle in x between two bounds, drawn in the plane turned by some angle.

@@ -39,7 +39,7 @@ pub(super) enum Start {
     Redrawn(Vec<(FaceId, Corners)>),
     /// Where its faces lie now, and they may stay there if they are under the limit.
     Lying,
-    /// Wherever an embedding puts it: it is made one chart from nothing, cut anew as its topology asks for.
+    /// Wherever an embedding puts it: each patch is made one chart from nothing, and cut as that asks for.
     Anew,
 }
 

@@ -11,7 +11,7 @@ use nalgebra::{Complex, Point2};
 use crate::mesh::HalfedgeId;
 
 use super::super::border::{self, BorderRun};
-use super::super::cost::Price;
+use super::super::cost::{LEAST_GLUED, Price};
 use super::super::edit::Edit;
 use super::super::history::{History, MoveKind, Place};
 use super::super::rigid_motion::longest_fit;
@@ -21,9 +21,6 @@ use super::{Move, Proposal, Site, Start};
 /// Charts are glued where their borders fit, by a rigid motion, up to this share (root of mean square over length) of the
 /// length that is glued: a straight border and an arc of 120°. If that is over the limit, once more where they fit closer.
 const FITS: [f64; 2] = [0.08, 0.03];
-/// What is glued is at least so many times as long as the square root of the smaller chart's area: a chart that hangs on by less
-/// is no easier to paint than one by itself.
-const LEAST_GLUED: f64 = 0.2;
 /// Failed trials a chart may take part in before it is left alone.
 const MOST_FAILURES: usize = 3;
 

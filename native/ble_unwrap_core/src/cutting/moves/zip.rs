@@ -12,19 +12,23 @@ use super::super::history::{History, MoveKind, Place};
 use super::super::state::{ChartId, Cutting};
 use super::{Move, Proposal, Site, Start};
 
-/// Ends that were not worth closing, before a chart is left alone.
+// Measured over 13 closed meshes of 250 to 10,000 faces at limits of 1.01, 1.015 and 1.02 without a stretch price: the cost is of charts
+// and seam, in geometric means.
+
+/// Ends that were not worth closing, before a chart is left alone. With 4 instead of 2 the cost is 0.6 % higher, and so is the time, by 7 %.
 const MOST_FAILURES: usize = 2;
-/// What is closed costs at least as much as so many roots of the surface's area: shorter ends are not worth a minimisation.
+/// What is closed costs at least as much as so many roots of the surface's area: shorter ends are not worth a minimisation. Half of
+/// it takes another 0.1 % off the cost.
 const LEAST_CLOSED: f64 = 0.02;
 /// A gap of width g between the sides of a cut, closed, costs an excess of squared stretch of about g²/4, times area. An end is
-/// tried as far as the limit and the price may allow that much.
+/// tried as far as the limit and the price may allow that much. With 2 and 8 instead of 4 the cost is 1.5 % and 1.7 % higher.
 const HOPE: f64 = 4.0;
-/// The sides of a cut lie at most so many times as far apart as what is closed is long: from further apart there is no good start.
+/// The sides of a cut lie at most so many times as far apart as what is closed is long: from further apart there is no good start. With
+/// 1 instead of 2 the cost is 2.3 % higher.
 const MOST_OPEN: f64 = 2.0;
 /// If closing so much of a cut as there is hope for does not do, this share of it is tried.
 const SHARE: f64 = 0.5;
-/// Lengths that are tried at one end. A longer piece that does not do is mostly told by its start, which costs little; 4 instead of 3
-/// shorten the seams of 19 models by 1 %.
+/// Lengths that are tried at one end. With 2 and 5 instead of 3 seams are 0.3 % longer and 0.8 % shorter, in 0.87 and 1.08 of the time.
 const TRIES: usize = 3;
 
 /// The end of a cut in a chart, glued.
@@ -71,9 +75,9 @@ impl Zip {
         let room = chart.patch.area() * (self.limit * self.limit - chart.l2 * chart.l2);
         // Both sides of an edge end where the next one begins.
         let gap = |h: HalfedgeId| (cutting.end(h) - cutting.start(mesh.twin(h))).norm_squared();
-        let length = |count: usize| end[..count].iter().map(|&h| cutting.seam_length(h)).sum::<f64>();
+        let lengths: Vec<f64> = running_sums(end.iter().map(|&h| cutting.seam_length(h)));
         let is_hopeful = |count: usize| {
-            let (seam, gap) = (length(count), gap(end[count - 1]));
+            let (seam, gap) = (lengths[count], gap(end[count - 1]));
             gap <= HOPE * room.min(price.excess_worth(seam)) && gap <= (MOST_OPEN * seam).powi(2)
         };
         let hoped = (1..=end.len()).rev().find(|&count| is_hopeful(count)).unwrap_or(0);
@@ -83,12 +87,21 @@ impl Zip {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
             counts.push((SHARE * last as f64) as usize);
         }
-        counts.retain(|&count| price.of_seam(length(count)) >= LEAST_CLOSED);
+        counts.retain(|&count| price.of_seam(lengths[count]) >= LEAST_CLOSED);
         counts.dedup();
         let glue = |&count: &usize| Proposal { edit: Edit::new(mesh, &end[..count], &[]), start: Start::Glued(None) };
         let ways: Vec<Proposal> = counts.iter().map(glue).collect();
-        (!ways.is_empty()).then(|| (length(hoped), Site { place, charts: vec![id], ways }))
+        (!ways.is_empty()).then(|| (lengths[hoped], Site { place, charts: vec![id], ways }))
     }
+}
+
+/// The sums of the first none, one, two … of some lengths.
+fn running_sums(lengths: impl Iterator<Item = f64>) -> Vec<f64> {
+    let sums = lengths.scan(0.0, |sum, length| {
+        *sum += length;
+        Some(*sum)
+    });
+    std::iter::once(0.0).chain(sums).collect()
 }
 
 /// The cuts that end inside the chart, along a run whose two sides are the chart's own: for each the edges from its end on, on the
