@@ -8,7 +8,7 @@ use crate::progress::Cancelled;
 pub(crate) enum Outcome<M, P> {
     /// It has been made into this.
     Made(M),
-    /// It has been divided into other pieces, each of them smaller.
+    /// It has been divided into other pieces, each of them smaller or nearer to being made.
     Divided(Vec<P>),
 }
 
@@ -26,7 +26,7 @@ pub(crate) struct Rounds<M, N> {
 /// Takes a step with every piece, in parallel, then with all parts of those that were divided, and so on. In each round the pieces
 /// are begun in ascending order of `key`, so that no long one starts last. Every thread has a scratch of its own.
 ///
-/// The result does not depend on the number of threads. It ends if every division makes smaller pieces.
+/// The result does not depend on the number of threads. It ends if no chain of divisions, each of a part of the one before, goes on for ever.
 ///
 /// # Errors
 /// The first error of a step.

@@ -16,7 +16,7 @@ use crate::mesh::{Coarse, FaceId, HalfedgeId, TriMesh, VertexId};
 
 /// A fine cut replaces a coarse edge; it is looked for this many edge lengths around.
 const LONGEST_DETOUR: f64 = 3.0;
-/// Cuts are mended so many times at most. They need it where paths on the fine mesh run side by side, mostly once or twice.
+/// Cuts are mended so many times at most, so that it ends whatever the mesh. They need it where paths on the fine mesh run side by side.
 const MOST_REPAIRS: usize = 16;
 /// Outside its coarse face a vertex is placed by linear extrapolation, up to this barycentric coordinate below
 /// zero: borders move by about two coarse edges, and further out the plane of a face says nothing.
