@@ -89,20 +89,12 @@ fn turned(mesh: PolyMesh, number: u32) -> PolyMesh {
     })
 }
 
-/// A tube of thousands of sides is a wall and two caps like any other. Either hardly anything of it is stretched, or the
-/// seams are shorter for a little stretch: both are good, and which it is hangs on the number of sides.
+/// A tube of thousands of sides is a wall and two caps like any other, none of them bent.
 #[test]
 fn a_tube_of_many_sides_is_as_good_as_one_of_few() {
     for sides in [12, 5_000] {
         let tube = unwrapped(&prism(sides, [0.0, 2.0], 1.0, true, false)).report;
-        let is_good = tube.l2 < 1.002 || tube.seam_length < 2.5 && tube.l2 < 1.025;
-        assert!(
-            tube.charts <= 3 && is_good,
-            "{sides} sides: {} charts, {}, {}",
-            tube.charts,
-            tube.l2,
-            tube.seam_length
-        );
+        assert!(tube.charts <= 3 && tube.l2 < 1.001, "{sides} sides: {} charts, {}", tube.charts, tube.l2);
     }
 }
 
