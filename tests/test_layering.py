@@ -58,12 +58,13 @@ MAY_USE = {
     "error": {"error_kind", "memory", "mesh", "metrics", "packing", "progress", "verify"},
     "settings": {"choice", "embedding", "error", "geodesics", "mesh", "packing", "segmentation", "stretch"},
     "cache": TOOLS,
+    "visibility": FOUNDATION,
     "flattening": TOOLS | {"cache", "charts", "embedding", "settings", "stretch"},
     # From surfaces to charts, and from charts to atlases.
     "cutting": TOOLS | set(STAGES) - {"packing"} | {"cache", "flattening", "settings"},
     "layout": TOOLS | set(STAGES) | JUDGES | GATHERED | RESULTS | {"cache", "cutting", "flattening"},
     # What sees several stages. None of the three sees another.
-    "unwrap": FOUNDATION | GATHERED | RESULTS | {"cache", "cutting", "layout"},
+    "unwrap": FOUNDATION | GATHERED | RESULTS | {"cache", "cutting", "layout", "visibility"},
     "cloud": TOOLS | set(STAGES) | GATHERED | {"clock", "report"},
     "standalone": TOOLS | set(STAGES) | JUDGES | GATHERED | {"clock", "flattening"},
     # The benchmarks' and tests' window into the stages.

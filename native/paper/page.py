@@ -206,8 +206,8 @@ either the mesh is left out of that column.
 
 {rivals.table(rows)}
 
-Most atlases hardly depend on the start. Where the geodesics go round holes, notches and gaps Isomap's start folds and overlaps more, and there it
-shows: the kernel asks little of points that are far apart.
+Most atlases hardly depend on the start. Where the geodesics go round holes, notches and gaps Isomap's start folds over itself more, since classical scaling asks
+as much of far points as of near ones; whether that makes fewer charts the rows above say, with their errors.
 `python native/paper/rivals.py MODEL ...` makes the table for any models."""
 
 
@@ -260,30 +260,6 @@ def _limits():
   running performance" than Isomap cannot be checked against their program; the table gives both here.
 - **"Evenly-sized patches, comparable time"**: counted above for generated models, not for theirs.
 - After minimisation the start no longer shows in the stretch: default BLE and Isomap end within a thousandth of each other. What the better embedding brings is fewer flips to
-  remove, and patches that lie flat in one piece where Isomap's start folds over itself.
+  remove, and a better guess of which patches will lie flat.
 
-## What was tried to make the embedding count for more
-
-Measured on 28 to 32 models (the largest left out where they took too long), one thread, limits 1.1 and 1.02, with a price on stretch and without.
-
-- **How much hangs on the start.** Of the CPU time of an unwrap (with one start a patch) the embeddings are 2 % and all that begins from them (flips
-  cleared, stretch minimised) 15 %, on meshes with very many charts a quarter; the rest are distances, trials that begin from charts as they lie,
-  coarse meshes, packing. So a fifth less CPU time is out of reach of any start, however good. A quarter of the trials that begin from an embedding, two in five
-  where there are very many charts, end because it folds or lies on itself, not for the stretch; they cost 4 %, and 10 % there.
-- **A narrower kernel where the first start comes to nothing**, ½ and then ¼ of the width, which Isomap has not: 5.6 % fewer charts than Isomap (0.944 ± 0.028) over the models and open surfaces together, where the
-  same search without it has 0.964 ± 0.026; over the models alone 1.8 ± 1.2 % fewer charts than without. With the search as it is now it cost 8 % more CPU time and won nothing on 16 models, so it is not kept. On the open
-  surfaces with holes and notches raw embeddings turn over 3.9 % of the triangles with Isomap, 0.9 % with a kernel width of 0.2, 0.5 % with 0.1, 1.1 % with 0.05 and 4.8 % with 0.01. On models
-  it is more of a second throw: a narrower start that has more folds than the first succeeds about as often as one that has fewer.
-- **Narrower from the outset** (0.1, with 0.05 and 0.2 where that fails): about as many charts, more CPU time on models. **From wide to narrow**, each fit from the
-  one before: 0.5 ± 0.4 % fewer charts than from classical scaling each time, which is nothing. **All three widths, the least folded first**: 1.1 ± 0.9 % more charts
-  than in the order of the widths. **A retry after an overlap only from a start with half the folds**: as dear, and on notched surfaces half of what
-  is won is lost.
-- **Deviance as a test whether the limit can be reached.** The mean deviance of the landmarks (equation 12) is the best predictor: it tells patches that come
-  under the limit from those that do not with an area under the curve of 0.90, 0.84 and 0.80 (limits to 1.015, 1.03, 1.07), Isomap's
-  stress with 0.82, 0.80 and 0.71, the planarity of classical scaling with 0.89, 0.84 and 0.76. But the minimisations that it could spare are few: the bulge (`stretch::bulge`)
-  has sent most hopeless patches to darts before, and what the rest cost is 5 % of the CPU time, of which a test that loses 2 % of the
-  charts saves 1.4 % with the deviance and 1.3 % with the stress.
-- **The bound on planarity by model.** None of 6,982 patches was below it (`LEAST_PLANARITY`): the bulge comes first.
-- **Minimisation from a better start** takes as many steps: 9.0 from BLE, 8.3 from Isomap, on the open surfaces, since BLE also lets harder patches through.
-- **Deviance as the cost of a cut**, in place of classical scaling's errors in the minimum cut of a split: 4.4 ± 2.1 % more charts over 20 models.
-- **Not tried**: the deviance as the place where a dart ends, and joins placed by logistic regression."""
+What was tried to make the embedding count for more, with its numbers, is in [tried.md](tried.md)."""

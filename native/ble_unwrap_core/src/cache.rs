@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use nalgebra::Point2;
 
 use crate::geodesics::LandmarkDistances;
-use crate::mesh::TriMesh;
+use crate::mesh::{TriMesh, VertexId};
 use crate::progress::Progress;
 
 /// Memory of a cache per face of the mesh: as much as one unwrap takes beside it at its peak.
@@ -22,6 +22,8 @@ const LEAST_BYTES: usize = 64 << 20;
 /// Kinds of results; each is of one type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Kind {
+    /// How far vertices can be seen.
+    Visibility,
     /// The charts of a component.
     Charts,
     /// A coarse mesh.
@@ -101,11 +103,13 @@ impl Fingerprint {
         }
     }
 
-    /// Positions, triangles, how they are glued, and guides.
+    /// Positions, triangles, how they are glued, and where borders are liked.
     pub(crate) fn mesh(&mut self, mesh: &TriMesh) {
         self.reals(mesh.positions().iter().flat_map(|p| [p.x, p.y, p.z]));
         self.indices(mesh.triangles().iter().flatten().map(|v| v.index()));
         self.indices(mesh.halfedges().map(|h| 2 * mesh.twin(h).index() + usize::from(mesh.is_guide(h))));
+        let vertices: Vec<VertexId> = mesh.vertices().collect();
+        self.reals(mesh.dislike_of(&vertices).into_iter().map(f64::from));
     }
 
     /// Settings, by all that they print.

@@ -163,6 +163,7 @@ pub mod standalone;
 mod stretch;
 mod unwrap;
 mod verify;
+mod visibility;
 
 pub use atlas::Atlas;
 pub use cloud::{CloudError, CloudReport, PointAtlas, PointDefect, unwrap_points};

@@ -36,6 +36,11 @@ pub(super) fn as_one(
     Attempt::new(&Measured::new(patch, None, settings, run), settings, run).run(rungs)
 }
 
+/// Whether a patch of some topology may be a chart as it is.
+pub(super) fn may_be_chart(topology: Topology, settings: &Settings) -> bool {
+    topology.is_chart() && (settings.holes == Holes::Keep || topology.loops == 1)
+}
+
 /// One patch under trial.
 pub(super) struct Attempt<'a> {
     measured: &'a Measured<'a>,
@@ -67,7 +72,7 @@ impl<'a> Attempt<'a> {
     /// As it is if its topology allows, else, or if that does not do, cut open.
     pub(super) fn run(&self, rungs: &mut Rungs) -> Result<Option<Chart>, Cancelled> {
         let patch = self.patch();
-        let may_be_chart = self.topology.is_chart() && (self.settings.holes == Holes::Keep || self.topology.loops == 1);
+        let may_be_chart = may_be_chart(self.topology, self.settings);
         let is_closed = self.topology.loops == 0 && self.topology.genus() == 0;
         if may_be_chart && let Some(flat) = flattening::isometric(patch, rungs) {
             return Ok(Some(flat.into_chart(patch.clone())));
@@ -84,26 +89,7 @@ impl<'a> Attempt<'a> {
                     return Ok(None);
                 }
             }
-            let projected =
-                if is_closed { None } else { flattening::projected(patch, self.settings, rungs, self.run)? };
-            if let Some(Flattened::Flat(flat)) = projected {
-                return Ok(Some(flat.into_chart(patch.clone())));
-            }
-            let bulging = self.bulging(Cow::Borrowed(patch))?;
-            let is_hopeless = is_closed || bulging.as_ref().is_some_and(|bulging| !bulging.is_promising());
-            let flattened = match projected {
-                Some(flattened) => flattened,
-                None if is_hopeless => Flattened::Refused,
-                None => {
-                    let (distances, analysis) = self.measured.analysis()?;
-                    self.flatten(patch, distances, analysis, rungs)?
-                }
-            };
-            let chart = match flattened {
-                Flattened::Flat(flat) => return Ok(Some(flat.into_chart(patch.clone()))),
-                Flattened::Near(uv) => self.with_darts(bulging, uv, rungs)?,
-                Flattened::Refused => self.cut_by_darts(bulging, rungs)?,
-            };
+            let chart = self.flat_or_darted(is_closed, rungs)?;
             if chart.is_some() || is_closed {
                 return Ok(chart);
             }
@@ -121,6 +107,30 @@ impl<'a> Attempt<'a> {
             }
         }
         self.run_cut(self.cut_to_disk(), rungs)
+    }
+
+    /// The patch as it is, from its projection or its embedding, or with darts where it bulges.
+    fn flat_or_darted(&self, is_closed: bool, rungs: &mut Rungs) -> Result<Option<Chart>, Cancelled> {
+        let patch = self.patch();
+        let projected = if is_closed { None } else { flattening::projected(patch, self.settings, rungs, self.run)? };
+        let bulging = match projected {
+            Some(Flattened::Flat(_)) => None,
+            _ => self.bulging(Cow::Borrowed(patch))?,
+        };
+        let is_hopeless = is_closed || bulging.as_ref().is_some_and(|bulging| !bulging.is_promising());
+        let flattened = match projected {
+            Some(flattened) => flattened,
+            None if is_hopeless => Flattened::Refused,
+            None => {
+                let (distances, analysis) = self.measured.analysis()?;
+                self.flatten(patch, distances, analysis, rungs)?
+            }
+        };
+        match flattened {
+            Flattened::Flat(flat) => Ok(Some(flat.into_chart(patch.clone()))),
+            Flattened::Near(uv) => self.with_darts(bulging, uv, rungs),
+            Flattened::Refused => self.cut_by_darts(bulging, rungs),
+        }
     }
 
     fn cut_to_disk(&self) -> Patch {

@@ -4,14 +4,17 @@
 //!
 //! [`CHART`] + ½·seam/√A + p·(area/A)·(L2² − 1)
 //!
-//! in units of √A. A seam has two sides, hence the half; p is [`Settings::stretch_price`]. A move of the search is made only if the cost
+//! in units of √A. A seam has two sides, hence the half, and counts for more where it is seen and for less on a guide
+//! ([`TriMesh::border_cost`]); p is [`Settings::stretch_price`]. A move of the search is made only if the cost
 //! falls. The limit is no part of the cost: what is over it is no chart. To measure a weight again, change it and run `make quality` before and after.
 //!
 //! Two things that the sum does not see are weighed against seam by themselves, after the search: the worst stretch of a place
 //! ([`lowers_peak`]), and how much of a texture can be filled ([`fill_asks_for_a_cut`], [`fills_better`]).
 
+use std::sync::Arc;
+
 use crate::charts::{Chart, Patch};
-use crate::mesh::{TriMesh, measure};
+use crate::mesh::{FaceId, Groups, TriMesh, VertexId, measure};
 use crate::settings::Settings;
 
 /// A chart costs as much as a seam of so many √A. It is the rate at which the search traded charts for seam when that was still spread
@@ -21,6 +24,8 @@ pub(super) const CHART: f64 = 1.5;
 /// tenth of a per cent.
 const UNROLLED: f64 = 1.001;
 
+/// A seam that nobody can see counts for this share of its length: no seam is for nothing.
+const LEAST_DISLIKE: f64 = 0.1;
 /// What is glued of a border is at least so many times as long as the square root of the smaller chart's area: a chart that hangs on
 /// by less is no easier to paint than one by itself.
 pub(super) const LEAST_GLUED: f64 = 0.2;
@@ -40,6 +45,36 @@ const GOOD_FILL: f64 = 0.6;
 /// A cut across is worth its seam if a texture that holds the parts needs at most this share of the length of one that holds the chart.
 /// A cut in the middle of a strip comes to 0.5 to 0.6.
 const LEAST_GAIN: f64 = 0.9;
+
+/// A mesh on which seams are the dearer the more they can be seen, by the power [`Settings::hide_seams`] of the visibility: each component by
+/// itself, so that in the mean over its surface a border counts for its length.
+pub(super) fn weighed(
+    mesh: &Arc<TriMesh>,
+    components: &Groups<FaceId>,
+    visibility: &[f32],
+    settings: &Settings,
+) -> Arc<TriMesh> {
+    let mut dislike = vec![1.0; mesh.vertex_count()];
+    let seen = |v: VertexId| f64::from(visibility[v.index()]).powf(settings.hide_seams);
+    for faces in components.iter() {
+        let (mut sum, mut total) = (0.0, 0.0);
+        for &f in faces {
+            let area = measure::triangle_area(mesh.triangle_positions(f));
+            sum += area * mesh.triangle(f).map(seen).iter().sum::<f64>() / 3.0;
+            total += area;
+        }
+        let mean = sum / total;
+        // Where there is no area, or nothing at all can be seen, all places are alike.
+        if mean > 0.0 {
+            for v in faces.iter().flat_map(|f| mesh.triangle(*f)) {
+                #[expect(clippy::cast_possible_truncation, reason = "a weight needs no more digits")]
+                let weight = (seen(v) / mean).max(LEAST_DISLIKE) as f32;
+                dislike[v.index()] = weight;
+            }
+        }
+    }
+    Arc::new(TriMesh::clone(mesh).with_dislike(dislike))
+}
 
 /// The prices on one surface.
 #[derive(Clone, Copy, Debug)]
@@ -86,12 +121,12 @@ impl Price {
     }
 
     /// The L2 stretch that one chart may have if it is to be worth those in whose place it would come ([`Price::is_worth`]), where so much
-    /// seam between and inside them is glued. A trial under this limit ends as soon as that is out of reach.
+    /// seam between and inside them is glued and none is opened. A trial under this limit ends as soon as that is out of reach.
     pub(super) fn limit_of_union(&self, old: &[&Chart], glued: f64, settings: &Settings) -> f64 {
         if may_bend(self.stretch) {
             return settings.stretch_limit;
         }
-        if old.iter().all(|chart| chart.l2 <= UNROLLED) {
+        if old.iter().all(|chart| unrolls(chart)) {
             return settings.stretch_limit.min(UNROLLED);
         }
         let share = old.iter().map(|chart| chart.patch.area()).sum::<f64>() / self.area;
@@ -103,7 +138,6 @@ impl Price {
     /// Whether some charts are better than those in whose place they would come. That the limit allows it is no reason to bend what
     /// unrolls.
     pub(super) fn is_worth(&self, old: &[&Chart], new: &[Chart]) -> bool {
-        let unrolls = |chart: &Chart| chart.l2 <= UNROLLED;
         if !may_bend(self.stretch) && old.iter().all(|chart| unrolls(chart)) && !new.iter().all(unrolls) {
             return false;
         }
@@ -111,6 +145,11 @@ impl Price {
         let after: f64 = new.iter().map(|chart| self.of(chart)).sum();
         after < before
     }
+}
+
+/// Whether a chart is as good as without stretch.
+fn unrolls(chart: &Chart) -> bool {
+    chart.l2 <= UNROLLED
 }
 
 /// Whether what unrolls may be bent: where stretch has no price, the limit alone says so.
@@ -167,6 +206,37 @@ mod tests {
     }
 
     #[test]
+    fn a_seam_costs_its_length_in_the_mean_and_less_where_it_is_hidden() {
+        let mesh = Arc::new(test_surfaces::grid(8, 8, [1.0, 1.0], 0.0));
+        let components = Groups::by_label(&vec![0; mesh.face_count()], 1, FaceId::new);
+        let visibility: Vec<f32> = mesh.positions().iter().map(|p| if p.x < 0.5 { 0.4 } else { 1.0 }).collect();
+        let weighed_by = |power: f64| {
+            weighed(&mesh, &components, &visibility, &Settings { hide_seams: power, ..Settings::default() })
+        };
+        let cost = |mesh: &TriMesh, is_there: fn(f64) -> bool| {
+            let middle = |h| 0.5 * (mesh.position(mesh.from(h)).x + mesh.position(mesh.to(h)).x);
+            let costs: Vec<f64> = mesh.edges().filter(|&h| is_there(middle(h))).map(|h| mesh.border_cost(h)).collect();
+            costs.iter().sum::<f64>() / costs.len() as f64
+        };
+        let alike = weighed_by(0.0);
+        assert!(alike.edges().all(|h| (alike.border_cost(h) - 1.0).abs() < 1e-6));
+        for power in [1.0, 2.0] {
+            let mesh = weighed_by(power);
+            let (hidden, seen) = (cost(&mesh, |x| x < 0.3), cost(&mesh, |x| x > 0.7));
+            assert!((hidden / seen - 0.4_f64.powf(power)).abs() < 1e-6, "{hidden} {seen}");
+            assert!((cost(&mesh, |_| true) - 1.0).abs() < 0.05);
+        }
+        let steep = weighed_by(10.0);
+        assert!(steep.edges().all(|h| steep.border_cost(h) >= LEAST_DISLIKE - 1e-6), "no seam is for nothing");
+        // A part of the mesh keeps the weights, as a coarse copy does.
+        let faces: Vec<FaceId> = steep.faces().skip(5).step_by(2).collect();
+        let (part, source) = steep.submesh(&faces, |_| false);
+        assert_eq!(part.dislike_of(&part.vertices().collect::<Vec<_>>()), steep.dislike_of(&source));
+        let unseen = weighed(&mesh, &components, &vec![0.0; mesh.vertex_count()], &Settings::default());
+        assert!(unseen.edges().all(|h| unseen.border_cost(h) == 1.0));
+    }
+
+    #[test]
     fn a_union_over_its_limit_is_not_worth_it_and_one_under_it_is() {
         let mesh = test_surfaces::grid(6, 4, [6.0, 4.0], 0.0);
         let (one, two) = (strips(&mesh, 6.0, 1).1, strips(&mesh, 6.0, 2).1);
@@ -208,6 +278,30 @@ mod tests {
         let old: Vec<&Chart> = two.iter().collect();
         assert!(!price(&mesh, 1e-3).is_worth(&old, &bent) && price(&mesh, 0.0).is_worth(&old, &bent));
         assert!(price(&mesh, 1e-3).is_worth(&old, &one));
+    }
+
+    #[test]
+    fn a_peak_is_worth_border_in_proportion_to_the_logarithm_of_its_fall() {
+        assert!(lowers_peak(3.0, 2.0, 0.01) && lowers_peak(30.0, 20.0, 0.01), "a third less for 1 %");
+        assert!(!lowers_peak(3.0, 2.0, 0.011) && !lowers_peak(3.0, 2.1, 0.01));
+        assert!(
+            lowers_peak(3.0, 2.9, 0.0) && lowers_peak(3.0, 2.9, -0.1),
+            "where the border gets no longer any fall is worth it"
+        );
+        assert!(!lowers_peak(3.0, 3.0, -0.1) && !lowers_peak(3.0, 3.1, -0.5), "but there must be one");
+    }
+
+    #[test]
+    fn a_chart_that_leaves_a_texture_empty_is_cut_and_more_so_where_it_has_seams_all_round() {
+        let (plank, body) = (0.0, 1.0);
+        assert!(fill_asks_for_a_cut(0.2, plank) && !fill_asks_for_a_cut(0.3, plank));
+        assert!(fill_asks_for_a_cut(0.3, body) && !fill_asks_for_a_cut(0.5, body));
+        assert!(
+            fill_asks_for_another_cut(0.5) && !fill_asks_for_another_cut(0.7),
+            "once begun, until it is well filled"
+        );
+        assert!(fills_better(10.0, [5.0, 6.0].into_iter()), "a strip cut in the middle");
+        assert!(!fills_better(10.0, [5.0, 9.5].into_iter()), "the longest part counts");
     }
 
     #[test]

@@ -31,7 +31,7 @@ use rayon::prelude::*;
 use crate::cache::{self, Fingerprint, Kind, Run};
 use crate::charts::{Chart, Patch};
 use crate::flattening::Rungs;
-use crate::mesh::{FaceId, Groups, Surface};
+use crate::mesh::{FaceId, Groups, Surface, TriMesh};
 use crate::packing::PackSettings;
 use crate::progress::Cancelled;
 use crate::settings::{ChartScale, LimitOver, Moves, Settings};
@@ -47,20 +47,26 @@ pub(crate) use divide::divide;
 type Made = (Vec<Chart>, Rungs);
 
 /// Cuts a surface into charts under the stretch limit of `settings`, sorted by lowest face. `components` holds the faces of
-/// each connected piece, ascending.
+/// each connected piece, ascending, `visibility` how far each vertex can be seen, where that matters.
 ///
 /// # Errors
 /// The caller cancelled, or there is not enough memory.
 pub(crate) fn cut(
     surface: &Surface,
     components: &Groups<FaceId>,
+    visibility: Option<&[f32]>,
     settings: &Settings,
     run: &Run<'_>,
 ) -> Result<Made, Cancelled> {
-    let charted = Charted::new(run.progress, surface.mesh.face_count());
+    let mesh = &match visibility {
+        Some(visibility) => cost::weighed(&surface.mesh, components, visibility, settings),
+        None => Arc::clone(&surface.mesh),
+    };
+    let polygon = &surface.polygon;
+    let charted = Charted::new(run.progress, mesh.face_count());
     let of_component = |component: usize| {
         let faces = components.group(component);
-        (component, charts_of(&whole(surface, faces), faces, settings, &charted, run))
+        (component, charts_of(&whole(mesh, polygon, faces), faces, settings, &charted, run))
     };
     // The largest first, so that no long one starts last.
     let mut order: Vec<usize> = (0..components.len()).collect();
@@ -77,7 +83,6 @@ pub(crate) fn cut(
             Err(kept) => charts.extend_from_slice(&kept.0),
         }
     }
-    let (mesh, polygon) = (&surface.mesh, &surface.polygon);
     if settings.limit_over == LimitOver::Atlas && settings.moves >= Moves::Join {
         charts = join_within_atlas(mesh, polygon, charts, settings, &mut rungs, run)?;
     }
@@ -88,10 +93,9 @@ pub(crate) fn cut(
 }
 
 /// A component as a mesh of its own, which a connected surface is already.
-fn whole(surface: &Surface, faces: &[FaceId]) -> Patch {
-    let Surface { mesh, polygon, .. } = surface;
+fn whole(mesh: &Arc<TriMesh>, polygon: &[u32], faces: &[FaceId]) -> Patch {
     if faces.len() == mesh.face_count() {
-        return Patch::whole(Arc::clone(mesh), polygon.clone());
+        return Patch::whole(Arc::clone(mesh), polygon.to_vec());
     }
     let (part, _) = mesh.submesh(faces, |_| false);
     Patch::whole(Arc::new(part), faces.iter().map(|f| polygon[f.index()]).collect())

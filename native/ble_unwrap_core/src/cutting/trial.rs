@@ -7,7 +7,7 @@ use crate::charts::{Chart, Patch};
 use crate::flattening::{self, Polished, Positions, Rungs};
 use crate::mesh::FaceId;
 use crate::progress::Cancelled;
-use crate::settings::{Holes, Settings};
+use crate::settings::Settings;
 
 use super::attempt;
 use super::moves::{Proposal, Start};
@@ -35,6 +35,10 @@ pub(super) fn trial(
     run.progress.check()?;
     let mut charts = Vec::new();
     for patch in proposal.edit.patches(cutting) {
+        // An embedding cuts what has no chart's topology; where faces lie already, nothing does.
+        if !matches!(proposal.start, Start::Anew) && !attempt::may_be_chart(patch.mesh.topology(), settings) {
+            return Ok(Verdict::Refused);
+        }
         match flattened(cutting, patch, &proposal.start, settings, rungs, run)? {
             Verdict::Charts(made) => charts.extend(made),
             refused => return Ok(refused),
@@ -52,16 +56,11 @@ fn flattened(
     rungs: &mut Rungs,
     run: &Run<'_>,
 ) -> Result<Verdict, Cancelled> {
-    let may_be_chart = || {
-        let topology = patch.mesh.topology();
-        topology.is_chart() && (settings.holes == Holes::Keep || topology.loops == 1)
-    };
     let polished = match start {
         Start::Anew => {
             let chart = attempt::as_one(&patch, settings, rungs, run)?;
             return Ok(chart.map_or(Verdict::Refused, |chart| Verdict::Charts(vec![chart])));
         }
-        _ if !may_be_chart() => Polished::Refused,
         Start::Glued(moved) => flattening::sewn(&patch, &drawn(cutting, &patch, *moved), settings, rungs, run)?,
         Start::Lying => flattening::part_of_chart(&patch, positions(cutting, &patch, &[]), settings, rungs, run)?,
         Start::Redrawn(anew) => flattening::lying(&patch, positions(cutting, &patch, anew), settings),

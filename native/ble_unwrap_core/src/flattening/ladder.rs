@@ -10,7 +10,7 @@ use crate::geodesics::LandmarkDistances;
 use crate::mesh::{FaceId, TriMesh};
 use crate::progress::Cancelled;
 use crate::settings::Settings;
-use crate::stretch::{self, BOUNDARY_REACH, Minimised, StretchError};
+use crate::stretch::{self, BOUNDARY_REACH, Minimised, Stitcher, StretchError};
 
 use super::rungs::{Rung, Rungs};
 use super::steps::Steps;
@@ -200,18 +200,22 @@ pub(crate) fn sewn(
 ) -> Result<Polished, Cancelled> {
     let trial = Trial::new(patch, settings, run);
     trial.isometric_or(rungs, |rungs| {
+        let mut stitcher = match Stitcher::new(&patch.mesh, &trial.steps.rest, drawn) {
+            Ok(stitcher) => stitcher,
+            Err(StretchError::Cancelled(c)) => return Err(c),
+            Err(_) => return Ok(Polished::BadStart),
+        };
         // Turned triangles fold less often; but where both do not, those that keep their turn end with less stretch and shorter seams.
-        for stitched in [stretch::stitch, stretch::stitch_turned] {
-            let polished = match stitched(&patch.mesh, &trial.steps.rest, drawn) {
-                Ok(start) => trial.polish_or_not(&start, settings.stretch_limit, Rung::Sewn, rungs)?,
-                Err(StretchError::Cancelled(c)) => return Err(c),
-                Err(_) => Polished::BadStart,
-            };
-            if !matches!(polished, Polished::BadStart) {
-                return Ok(polished);
-            }
+        let start = stitcher.stitch();
+        let polished = trial.polish_or_not(&start, settings.stretch_limit, Rung::Sewn, rungs)?;
+        if !matches!(polished, Polished::BadStart) {
+            return Ok(polished);
         }
-        Ok(Polished::BadStart)
+        match stitcher.stitch_turned() {
+            Ok(start) => trial.polish_or_not(&start, settings.stretch_limit, Rung::Sewn, rungs),
+            Err(StretchError::Cancelled(c)) => Err(c),
+            Err(_) => Ok(Polished::BadStart),
+        }
     })
 }
 

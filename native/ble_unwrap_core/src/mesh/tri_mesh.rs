@@ -15,7 +15,8 @@ use super::index::{FaceId, HalfedgeId, VertexId};
 ///
 /// Not guaranteed: being connected, having a boundary, positive areas, distinct positions.
 ///
-/// Edges may be marked as guides, which the borders of charts should follow; parts keep the marks.
+/// Edges may be marked as guides, which the borders of charts should follow, and places may be more or less liked for borders; parts
+/// keep both.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TriMesh {
     positions: Vec<Point3<f64>>,
@@ -25,6 +26,8 @@ pub(crate) struct TriMesh {
     outgoing: Vec<HalfedgeId>,
     /// Whether a half-edge lies on a guide; empty where none does.
     guide: Vec<bool>,
+    /// What a border at each vertex counts for its length; empty where that is 1 everywhere.
+    dislike: Vec<f32>,
 }
 
 /// What a border along a guide counts for its length: a little less than along the edge of a box. It may take a way so
@@ -130,7 +133,7 @@ impl TriMesh {
         }
         let positions = source.iter().map(|&s| position(s)).collect();
         let triangles = corner_vertex.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
-        (Self { positions, triangles, twin, outgoing, guide: Vec::new() }, source)
+        (Self { positions, triangles, twin, outgoing, guide: Vec::new(), dislike: Vec::new() }, source)
     }
 
     /// Builds a mesh from vertex indices, gluing every pair of opposed half-edges.
@@ -223,7 +226,9 @@ impl TriMesh {
             }
         }
         let (mesh, source) = Self::from_glued(&corner_source, twin, |s| self.positions[s as usize]);
-        (mesh.with_guides(guide), source.into_iter().map(|s| VertexId::new(s as usize)).collect())
+        let source: Vec<VertexId> = source.into_iter().map(|s| VertexId::new(s as usize)).collect();
+        let dislike = self.dislike_of(&source);
+        (mesh.with_guides(guide).with_dislike(dislike), source)
     }
 
     /// Number of vertices.
@@ -374,11 +379,29 @@ impl TriMesh {
         self.guide.get(h.index()).is_some_and(|guide| *guide)
     }
 
-    /// What a border along an edge costs beside the same border where there is no guide: 1, or less on a guide.
+    /// The same mesh with what a border at each vertex counts for its length, or nothing where that is 1 everywhere.
+    ///
+    /// # Panics
+    /// If there is neither a number for each vertex nor none at all.
+    #[must_use]
+    pub(crate) fn with_dislike(self, dislike: Vec<f32>) -> Self {
+        assert!(dislike.is_empty() || dislike.len() == self.positions.len(), "one number a vertex");
+        Self { dislike, ..self }
+    }
+
+    /// What a border counts for its length at some vertices, for a mesh made of them.
+    pub(crate) fn dislike_of(&self, vertices: &[VertexId]) -> Vec<f32> {
+        if self.dislike.is_empty() { Vec::new() } else { vertices.iter().map(|v| self.dislike[v.index()]).collect() }
+    }
+
+    /// What a border along an edge costs beside one of the same length at a place of the usual kind: less on a guide, and less where
+    /// borders are liked.
     #[inline]
     #[must_use]
     pub(crate) fn border_cost(&self, h: HalfedgeId) -> f64 {
-        if self.is_guide(h) { GUIDE_COST } else { 1.0 }
+        let guide = if self.is_guide(h) { GUIDE_COST } else { 1.0 };
+        let at = |v: VertexId| self.dislike.get(v.index()).map_or(1.0, |&dislike| f64::from(dislike));
+        guide * 0.5 * (at(self.from(h)) + at(self.to(h)))
     }
 
     /// One of the half-edges that leave `v`.

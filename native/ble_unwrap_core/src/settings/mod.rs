@@ -151,6 +151,10 @@ pub struct Settings {
     /// and joined only where it does not. With 0, stretch under the limit costs nothing, and seams are as short as the limit
     /// allows.
     pub stretch_price: f64,
+    /// How much dearer a seam is where it can be seen: what it costs goes with this power of its visibility, which is the share of the
+    /// outside, weighted with the cosine, that rays from there reach. In the mean over a component it costs what its length does.
+    /// With 0 all places are alike.
+    pub hide_seams: f64,
     /// What happens to the holes of charts.
     pub holes: Holes,
     /// How charts are scaled relative to each other.
@@ -184,6 +188,7 @@ impl Default for Settings {
             coarse: true,
             moves: Moves::All,
             stretch_price: DEFAULT_STRETCH_PRICE,
+            hide_seams: 2.0,
             holes: Holes::Keep,
             chart_scale: ChartScale::Uniform,
             together_max: 0,
@@ -211,6 +216,7 @@ impl Settings {
             coarse: false,
             moves: Moves::Join,
             stretch_price: 0.0,
+            hide_seams: 0.0,
             segmentation: SegmentationSettings::paper(),
             together_max: PAPER_TOGETHER_MAX,
             geodesics: GeodesicSettings::paper(),

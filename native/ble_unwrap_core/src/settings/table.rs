@@ -382,6 +382,9 @@ pub static TABLE: &[Setting] = &[
     row("stretch_price", "Stretch Price", Group::Charts, Kind::Real(|s| &mut s.stretch_price, Interval::closed(0.0, 1e3)), "width of the surface",
         "How much more seam less stretch is worth: the length of seam for an excess of 1 of the squared stretch. \
          0 makes seams as short as the limit allows; more gives less stretch and more charts."),
+    row("hide_seams", "Hide Seams", Group::Charts, Kind::Real(|s| &mut s.hide_seams, Interval::closed(0.0, 10.0)), "",
+        "How strongly seams are drawn to where they are hidden: under chins, behind ears, between limbs. A seam costs as much as \
+         this power of how far it can be seen; 0 makes all places alike."),
     row("moves", "Moves", Group::Charts, Kind::Choice(|s| &mut s.moves), "",
         "What the search for charts may do."),
     row("holes", "Holes", Group::Charts, Kind::Choice(|s| &mut s.holes), "",

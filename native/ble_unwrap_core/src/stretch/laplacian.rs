@@ -7,8 +7,8 @@ use crate::mesh::{HalfedgeId, TriMesh, VertexId};
 /// Weights are kept within these bounds: positive, so that solutions peak only where there is a source and few
 /// triangles flip, and well conditioned.
 pub(super) const WEIGHTS: (f64, f64) = (0.05, 20.0);
-/// Relative weight on the diagonal, against the shift that is left open where nothing is held.
-const RIDGE: f64 = 1e-10;
+/// Relative weight on the diagonal, against what is left open where nothing is held: the shift of the whole, or its turn.
+pub(super) const RIDGE: f64 = 1e-10;
 
 /// Minus the Laplacian with the cotangents of the rest triangles for weights, halves left out: twice what is usual.
 pub(super) struct Laplacian {

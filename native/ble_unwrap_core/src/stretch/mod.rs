@@ -51,7 +51,7 @@ pub(crate) use measure::{l2_of_positions, l2_stretch, l2_unsigned, linf_stretch,
 pub(crate) use overlap::{boundary_is_simple, first_flip};
 pub(crate) use part_boundary::{boundary_is_tangled, part_boundary};
 pub(crate) use peaks::lower_peaks;
-pub(crate) use stitch::{stitch, stitch_turned};
+pub(crate) use stitch::Stitcher;
 pub(crate) use tutte::{TutteBoundary, tutte_embedding};
 pub(crate) use unbend::unbend;
 

@@ -1,61 +1,72 @@
 //! Triangles drawn apart in the plane, drawn together as one map.
 //!
 //! Where two flat charts are laid side by side, or a cut is closed, the borders do not quite meet. What does not meet is spread
-//! over the whole map by Poisson's equation, with the Jacobians of the triangles for a right-hand side. A border that opens by
-//! more than half a radian folds so: there the angles between the two drawings of each edge are spread first, by another
+//! over the whole map by Poisson's equation, with the Jacobians of the triangles for a right-hand side. A border that opens
+//! wide may fold so: there the angles between the two drawings of each edge are spread first, by another
 //! equation of the kind, which gives every triangle a turn. To go on from there as rigidly as possible, each triangle turning its
 //! shape on the surface, was tried: it folds more than it gains.
 
 use nalgebra::{Point2, Rotation2};
 
 use super::StretchError;
-use super::laplacian::{Laplacian, WEIGHTS};
+use super::laplacian::{Laplacian, RIDGE, WEIGHTS};
 use crate::distortion::RestTriangle;
 use crate::linalg::{SparseCholesky, SparseError, SparsePattern};
 use crate::mesh::{HalfedgeId, TriMesh};
 
-/// Relative weight on the diagonal, against the turn of the whole, which is left open.
-const RIDGE: f64 = 1e-10;
-
-/// Positions that draw each face as near as can be to its three corners in `drawn`, by the lengths of their sides weighted with
-/// cotangents. May have flips and overlap. O(n^1.5).
-///
-/// # Errors
-/// [`StretchError::Solver`] where the system cannot be factored.
-pub(crate) fn stitch(
-    mesh: &TriMesh,
-    rest: &[RestTriangle],
-    drawn: &[[Point2<f64>; 3]],
-) -> Result<Vec<Point2<f64>>, StretchError> {
-    let n = mesh.vertex_count();
-    let mut laplacian = Laplacian::new(mesh, rest, |_| false)?;
-    let mut rhs = vec![0.0; 2 * n];
-    for ((t, weights), drawn) in mesh.triangles().iter().zip(&laplacian.weights).zip(drawn) {
-        for k in 0..3 {
-            let (i, j) = (t[k].index(), t[(k + 1) % 3].index());
-            let side = (drawn[(k + 1) % 3] - drawn[k]) * weights[k];
-            for (at, side) in [(0, side.x), (n, side.y)] {
-                rhs[at + i] -= side;
-                rhs[at + j] += side;
-            }
-        }
-    }
-    laplacian.solve_in_place(&mut rhs);
-    Ok((0..n).map(|i| Point2::new(rhs[i], rhs[n + i])).collect())
+/// A mesh whose triangles are drawn, each by itself, at three corners in the plane.
+pub(crate) struct Stitcher<'a> {
+    mesh: &'a TriMesh,
+    rest: &'a [RestTriangle],
+    drawn: &'a [[Point2<f64>; 3]],
+    laplacian: Laplacian,
 }
 
-/// The same, each face turned first so that the two drawings of an edge point the same way as nearly as can be. O(n^1.5).
-///
-/// # Errors
-/// [`StretchError::Solver`] where a system cannot be factored.
-pub(crate) fn stitch_turned(
-    mesh: &TriMesh,
-    rest: &[RestTriangle],
-    drawn: &[[Point2<f64>; 3]],
-) -> Result<Vec<Point2<f64>>, StretchError> {
-    let turn = |(corners, turn): (&[Point2<f64>; 3], f64)| corners.map(|p| Rotation2::new(turn) * p);
-    let turned: Vec<_> = drawn.iter().zip(turns(mesh, rest, drawn)?).map(turn).collect();
-    stitch(mesh, rest, &turned)
+impl<'a> Stitcher<'a> {
+    /// O(n^1.5).
+    ///
+    /// # Errors
+    /// [`StretchError::Solver`] where the system cannot be factored.
+    pub(crate) fn new(
+        mesh: &'a TriMesh,
+        rest: &'a [RestTriangle],
+        drawn: &'a [[Point2<f64>; 3]],
+    ) -> Result<Self, StretchError> {
+        Ok(Self { mesh, rest, drawn, laplacian: Laplacian::new(mesh, rest, |_| false)? })
+    }
+
+    /// Positions that draw each face as near as can be to its three corners, by the lengths of their sides weighted with cotangents.
+    /// May have flips and overlap. O(n log n).
+    pub(crate) fn stitch(&mut self) -> Vec<Point2<f64>> {
+        self.stitched(self.drawn)
+    }
+
+    /// The same, each face turned first so that the two drawings of an edge point the same way as nearly as can be. O(n^1.5).
+    ///
+    /// # Errors
+    /// [`StretchError::Solver`] where the system of the turns cannot be factored.
+    pub(crate) fn stitch_turned(&mut self) -> Result<Vec<Point2<f64>>, StretchError> {
+        let turn = |(corners, turn): (&[Point2<f64>; 3], f64)| corners.map(|p| Rotation2::new(turn) * p);
+        let turned: Vec<_> = self.drawn.iter().zip(turns(self.mesh, self.rest, self.drawn)?).map(turn).collect();
+        Ok(self.stitched(&turned))
+    }
+
+    fn stitched(&mut self, drawn: &[[Point2<f64>; 3]]) -> Vec<Point2<f64>> {
+        let n = self.mesh.vertex_count();
+        let mut rhs = vec![0.0; 2 * n];
+        for ((t, weights), drawn) in self.mesh.triangles().iter().zip(&self.laplacian.weights).zip(drawn) {
+            for k in 0..3 {
+                let (i, j) = (t[k].index(), t[(k + 1) % 3].index());
+                let side = (drawn[(k + 1) % 3] - drawn[k]) * weights[k];
+                for (at, side) in [(0, side.x), (n, side.y)] {
+                    rhs[at + i] -= side;
+                    rhs[at + j] += side;
+                }
+            }
+        }
+        self.laplacian.solve_in_place(&mut rhs);
+        (0..n).map(|i| Point2::new(rhs[i], rhs[n + i])).collect()
+    }
 }
 
 /// By how much each face is turned, in radians: what the two drawings of each edge differ by, spread over all faces by least squares,
@@ -105,7 +116,8 @@ mod tests {
         let mesh = hemisphere(8);
         let uv: Vec<Point2<f64>> = mesh.positions().iter().map(|p| p.xy() * 1.3).collect();
         let drawn: Vec<_> = mesh.triangles().iter().map(|t| t.map(|v| uv[v.index()])).collect();
-        let got = stitch(&mesh, &RestTriangle::of_mesh(&mesh), &drawn).expect("factored");
+        let rest = RestTriangle::of_mesh(&mesh);
+        let got = Stitcher::new(&mesh, &rest, &drawn).expect("factored").stitch();
         let shift = got[0] - uv[0];
         assert!(got.iter().zip(&uv).all(|(p, q)| (p - q - shift).norm() < 1e-6));
     }
@@ -122,7 +134,8 @@ mod tests {
                 if p.iter().map(|p| p.x).sum::<f64>() < 30.0 { p } else { p.map(right) }
             })
             .collect();
-        let got = stitch(&mesh, &RestTriangle::of_mesh(&mesh), &drawn).expect("factored");
+        let rest = RestTriangle::of_mesh(&mesh);
+        let got = Stitcher::new(&mesh, &rest, &drawn).expect("factored").stitch();
         for h in mesh.halfedges() {
             let (i, j) = (mesh.from(h).index(), mesh.to(h).index());
             let length = (got[i] - got[j]).norm() / mesh.edge_length(h);
@@ -161,7 +174,8 @@ mod tests {
                 }
             }
             let mesh = TriMesh::from_triangles(&positions, &triangles).0;
-            let uv = stitch_turned(&mesh, &RestTriangle::of_mesh(&mesh), &drawn).expect("factored");
+            let rest = RestTriangle::of_mesh(&mesh);
+            let uv = Stitcher::new(&mesh, &rest, &drawn).and_then(|mut s| s.stitch_turned()).expect("factored");
             assert_eq!(first_flip(&mesh, &uv), None, "a cut that opens by {opening}");
             assert!(l2_of_positions(&mesh, &uv, 1e-12) < 1.0 + 0.1 * opening * opening, "{opening}");
         }

@@ -1,13 +1,17 @@
 //! A conditioned mesh on its way to an atlas.
 
+use std::sync::Arc;
+
+use nalgebra::Point3;
+
 use crate::atlas::Atlas;
-use crate::cache::Run;
+use crate::cache::{Fingerprint, Kind, Run};
 use crate::clock::Clock;
 use crate::error::UnwrapError;
 use crate::mesh::{self, ConditionOptions, FaceId, Groups, MeshInput, Surface};
-use crate::progress::{Progress, Stage};
+use crate::progress::{Cancelled, Progress, Stage};
 use crate::settings::Settings;
-use crate::{cutting, layout};
+use crate::{cutting, layout, visibility};
 
 use super::needs;
 
@@ -40,8 +44,31 @@ impl Prepared {
     ) -> Result<Atlas, UnwrapError> {
         needs::require(input, self.components.len(), settings)?;
         run.progress.enter(Stage::Charts);
-        let (charts, rungs) = cutting::cut(&self.surface, &self.components, settings, run)?;
+        let visibility = self.visibility(input, settings, run)?;
+        let visibility = visibility.as_deref().map(Vec::as_slice);
+        let (charts, rungs) = cutting::cut(&self.surface, &self.components, visibility, settings, run)?;
         clock.lap("charts");
         layout::lay_out(input, &self.surface, charts, rungs, settings, clock, run)
+    }
+
+    /// How far each vertex of the surface can be seen, where seams are to be hidden.
+    fn visibility(
+        &self,
+        input: &MeshInput<'_>,
+        settings: &Settings,
+        run: &Run<'_>,
+    ) -> Result<Option<Arc<Vec<f32>>>, Cancelled> {
+        if settings.hide_seams <= 0.0 {
+            return Ok(None);
+        }
+        let Surface { mesh, vertex, .. } = &self.surface;
+        let positions: Vec<Point3<f64>> = vertex.iter().map(|&v| input.positions[v as usize].into()).collect();
+        let key = |f: &mut Fingerprint| {
+            f.mesh(mesh);
+            f.reals(positions.iter().flat_map(|p| [p.x, p.y, p.z]));
+        };
+        let bytes = |values: &Vec<f32>| 4 * values.len();
+        let compute = || visibility::of_vertices(mesh, &positions, run.progress);
+        run.recall(Kind::Visibility, key, bytes, compute).map(Some)
     }
 }

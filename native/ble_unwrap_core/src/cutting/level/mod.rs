@@ -57,18 +57,22 @@ pub(super) struct Part {
     /// Both sides of the edges inside it along which it is cut, sorted.
     cuts: Vec<HalfedgeId>,
     guide: Chart,
-    /// The number of the guide among all, where it has not been joined.
-    number: Option<usize>,
-    /// What it was joined of, or what it was before its cuts were closed further: to go back to.
-    pieces: Vec<Part>,
-    /// Whether it was charted under the stricter limit.
-    is_strict: bool,
+    origin: Origin,
+}
+
+/// How a part came about, which says what is done where the fine mesh refuses it.
+#[derive(Clone)]
+enum Origin {
+    /// The guide is one of the charts that the coarse mesh was divided into, by its number; whether under the stricter limit.
+    Charted { number: usize, is_strict: bool },
+    /// Other parts were joined, or the cuts of a single one closed further. There is a way back to them.
+    Pieces(Vec<Part>),
 }
 
 impl Part {
     /// Whether an edge of the coarse mesh lies between two of the charts that the guide was joined of.
     fn is_border(&self, coarse: &TriMesh, h: HalfedgeId) -> bool {
-        match &self.pieces[..] {
+        match self.pieces() {
             [] => false,
             [before] => before.is_border(coarse, h),
             pieces => {
@@ -76,6 +80,22 @@ impl Part {
                     |h: HalfedgeId| pieces.iter().position(|p| p.guide.patch.faces.binary_search(&h.face()).is_ok());
                 piece(h) != piece(coarse.twin(h))
             }
+        }
+    }
+
+    /// What it was made of on the coarse mesh, if of other parts.
+    fn pieces(&self) -> &[Part] {
+        match &self.origin {
+            Origin::Charted { .. } => &[],
+            Origin::Pieces(pieces) => pieces,
+        }
+    }
+
+    /// The number of its guide among the charts that the coarse mesh was divided into, where that is what it still is.
+    fn number(&self) -> Option<usize> {
+        match self.origin {
+            Origin::Charted { number, .. } => Some(number),
+            Origin::Pieces(_) => None,
         }
     }
 }
@@ -160,7 +180,7 @@ impl<'a> OnCoarse<'a> {
             guides.sort_unstable();
             guides.dedup();
             let is_mine =
-                |p: &Option<Part>| p.as_ref().and_then(|p| p.number).is_some_and(|n| guides.binary_search(&n).is_ok());
+                |p: &Option<Part>| p.as_ref().and_then(Part::number).is_some_and(|n| guides.binary_search(&n).is_ok());
             // A guide that has come to lie under two parts says of neither where to glue it.
             if guides.len() < 2 || rest.iter().filter(|p| is_mine(p)).count() != guides.len() {
                 continue;
@@ -170,8 +190,7 @@ impl<'a> OnCoarse<'a> {
                 Some(cuts) => {
                     let mut faces: Vec<FaceId> = pieces.iter().flat_map(|p| p.faces.iter().copied()).collect();
                     faces.sort_unstable();
-                    let is_strict = pieces.iter().all(|p| p.is_strict);
-                    joined.push(Part { faces, cuts, guide: chart.clone(), number: None, pieces, is_strict });
+                    joined.push(Part { faces, cuts, guide: chart.clone(), origin: Origin::Pieces(pieces) });
                 }
                 None => joined.extend(pieces),
             }
@@ -194,11 +213,14 @@ impl<'a> OnCoarse<'a> {
             let Some(guide) = charts.iter().find(same).filter(|chart| border(chart) < border(&part.guide)) else {
                 return part;
             };
-            let cuts = if part.pieces.is_empty() { Some(Vec::new()) } else { self.cuts_of(&part.pieces, guide) };
+            let cuts = match &part.origin {
+                Origin::Charted { .. } => Some(Vec::new()),
+                Origin::Pieces(pieces) => self.cuts_of(pieces, guide),
+            };
             match cuts {
                 Some(cuts) => {
-                    let (faces, is_strict) = (part.faces.clone(), part.is_strict);
-                    Part { faces, cuts, guide: guide.clone(), number: None, pieces: vec![part], is_strict }
+                    let faces = part.faces.clone();
+                    Part { faces, cuts, guide: guide.clone(), origin: Origin::Pieces(vec![part]) }
                 }
                 None => part,
             }
@@ -245,7 +267,7 @@ impl<'a> OnCoarse<'a> {
         let part = |faces: &[FaceId]| {
             let number = guide_of(faces);
             let (faces, guide) = (faces.to_vec(), charts[number].clone());
-            Part { faces, cuts: Vec::new(), guide, number: Some(number), pieces: Vec::new(), is_strict }
+            Part { faces, cuts: Vec::new(), guide, origin: Origin::Charted { number, is_strict } }
         };
         let groups = Groups::by_label(&parts.label, parts.parts, |i| patch.faces[i]);
         Ok(groups.iter().map(part).collect())
@@ -310,13 +332,14 @@ impl<'a> OnCoarse<'a> {
         {
             return Ok(Outcome::Made(Made::Chart(flat.into_chart(patch))));
         }
-        if !part.pieces.is_empty() {
-            return Ok(Outcome::Divided(part.pieces.clone()));
-        }
+        let is_strict = match &part.origin {
+            Origin::Pieces(pieces) => return Ok(Outcome::Divided(pieces.clone())),
+            Origin::Charted { is_strict, .. } => *is_strict,
+        };
         let mut faces = part.guide.patch.faces.clone();
         faces.sort_unstable();
         let patch = Patch::of_surface(&self.whole.mesh, &self.whole.polygon, faces);
-        if !part.is_strict {
+        if !is_strict {
             return Ok(Outcome::Divided(self.charted(&on_fine(), patch, true, rungs, run)?));
         }
         if patch.faces.len() <= LEAST_COARSE_FACES || part.faces.len() <= LEAST_FINE_FACES {
@@ -372,7 +395,10 @@ mod tests {
         let too_tight = Settings { stretch_limit: 1.0 + 1e-6, ..settings.clone() };
         let mut level = OnCoarse::new(Whole { patch: &whole }, &settings, &run).expect("not cancelled");
         let parts = level.parts(&mut rungs, &run).expect("not cancelled");
-        assert!(parts.iter().all(|part| !part.is_strict && part.guide.l2 <= settings.stretch_limit));
+        let strictly =
+            |part: &Part, wanted: bool| matches!(part.origin, Origin::Charted { is_strict, .. } if is_strict == wanted);
+        assert!(parts.iter().all(|part| part.guide.l2 <= settings.stretch_limit));
+        assert!(parts.iter().all(|part| strictly(part, false) || !part.pieces().is_empty()));
         level.settings = &too_tight;
         let mut open = parts;
         let (mut charted_again, mut split) = (0, 0);
@@ -381,13 +407,15 @@ mod tests {
             let mut faces: Vec<FaceId> = next.iter().flat_map(|part| part.faces.iter().copied()).collect();
             faces.sort_unstable();
             assert_eq!(faces, part.faces, "each face is in one part again");
-            if part.pieces.is_empty() && !part.is_strict {
+            // Those that are made of others have these to go back to.
+            let are_strict = |next: &[Part]| next.iter().all(|new| strictly(new, true) || !new.pieces().is_empty());
+            if strictly(&part, false) {
                 charted_again += 1;
-                assert!(next.iter().all(|part| part.is_strict));
-            } else if part.pieces.is_empty() {
+                assert!(are_strict(&next));
+            } else if strictly(&part, true) {
                 split += 1;
                 let size = |part: &Part| part.guide.patch.faces.len();
-                assert!(next.iter().all(|new| new.is_strict && size(new) < size(&part)));
+                assert!(are_strict(&next) && next.iter().all(|new| size(new) < size(&part)));
             }
             if split < 3 {
                 open.extend(next);
