@@ -260,7 +260,7 @@ def test_defaults_are_those_of_the_design():
         "stretch_solver": "newton",
         "margin": 4.0,
         "texture_size": (2048, 2048),
-        "rotation": "any",
+        "rotation": "aligned",
         "threads": 0,
     }
     assert {key: found[key] for key in expected} == expected

@@ -57,7 +57,7 @@ impl PackedCharts {
 ///     Least distance between charts, in texels; half of it is kept to the border.
 /// texture_size : int or two ints
 ///     Width and height of the texture in texels. Charts keep their shape in texels.
-/// rotation : {"any", "quarter", "none"}
+/// rotation : {"aligned", "any", "quarter", "none"}
 ///     How charts may be turned. They are never mirrored.
 /// threads : int
 ///     Threads to work with; 0 for as many as the machine has. The result does not depend on it.

@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 use super::grid::Grid;
 use super::outline::Outline;
 use super::placement::{Dense, Place};
-use super::pose::turn_alone;
+use super::pose::{aligned_turn, turn_alone};
 use super::raster::rasterise;
 use super::shape::SAFETY_TEXELS;
 use super::{PackSettings, Pose, Rotation};
@@ -20,13 +20,15 @@ pub(super) fn alone(outlines: &[Outline], which: usize, grid: Grid, settings: &P
     let inner = grid.inner();
     let room = inner.map(|size| size - 2.0 * SAFETY_TEXELS);
     let given = if grid.sideways { [0.0, 1.0] } else { [1.0, 0.0] };
+    let upright_or_lying = |[c, s]: [f64; 2]| {
+        let [upright, lying] = [[c, s], [-s, c]].map(|turn| (fit(outline, turn, room).scale, turn));
+        if lying.0 > upright.0 { lying.1 } else { upright.1 }
+    };
     let turn = match settings.rotation {
+        Rotation::Aligned => aligned_turn(outline).map_or_else(|| turn_alone(outline, room), upright_or_lying),
         Rotation::Any => turn_alone(outline, room),
         Rotation::None => given,
-        Rotation::Quarter => {
-            let [upright, lying] = [[1.0, 0.0], [0.0, 1.0]].map(|turn| (fit(outline, turn, room).scale, turn));
-            if lying.0 > upright.0 { lying.1 } else { upright.1 }
-        }
+        Rotation::Quarter => upright_or_lying([1.0, 0.0]),
     };
     let Fit { middle, scale } = fit(outline, turn, room);
     // The middle of the chart's box to the middle of the grid.
@@ -78,7 +80,7 @@ mod tests {
         let points = [[5.0, 7.0], [9.0, 7.0], [5.0, 8.0]].map(|[x, y]| Point2::new(x, y));
         let outline = Outline::new(&PackItem { points: &points, triangles: &[[0, 1, 2]] }, 0).expect("valid");
         for (width, height) in [(300, 300), (400, 90), (90, 400)] {
-            for rotation in [Rotation::Any, Rotation::Quarter, Rotation::None] {
+            for rotation in [Rotation::Aligned, Rotation::Any, Rotation::Quarter, Rotation::None] {
                 let settings = PackSettings { width, height, margin_texels: 3.0, rotation, ..PackSettings::default() };
                 let grid = Grid::new(&settings, 1).expect("room");
                 let dense = alone(std::slice::from_ref(&outline), 0, grid, &settings);

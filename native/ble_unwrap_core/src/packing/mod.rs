@@ -68,6 +68,8 @@ use outline::Outline;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Rotation {
+    /// Along the axes, or upright, where much of a chart's border is straight; any angle for the others.
+    Aligned,
     /// Any angle.
     Any,
     /// Multiples of a quarter turn from the pose that is given.
@@ -77,6 +79,7 @@ pub enum Rotation {
 }
 
 choices!(Rotation {
+    Aligned: "aligned", "Aligned", "Charts with straight borders lie along the axes, the others at any angle.";
     Any: "any", "Any", "Charts are turned by any angle, which packs tightest.";
     Quarter: "quarter", "Quarter Turns", "Charts are turned by multiples of 90° from how they were flattened, not set upright.";
     None: "none", "None", "Charts stay as they were flattened, at whatever angle that is.";
@@ -135,7 +138,7 @@ impl PackSettings {
 impl Default for PackSettings {
     /// A margin of four texels at a texture size of 2048, and rotation by any angle.
     fn default() -> Self {
-        Self { margin_texels: 4.0, width: 2048, height: 2048, rotation: Rotation::Any, quality: Quality::Fast }
+        Self { margin_texels: 4.0, width: 2048, height: 2048, rotation: Rotation::Aligned, quality: Quality::Fast }
     }
 }
 

@@ -1,21 +1,33 @@
 //! In which angles a chart is tried.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::Point2;
 
 use super::Rotation;
-use super::outline::Outline;
+use super::outline::{Edge, Outline};
 
 /// Angles compared for a chart alone in the texture, over half a turn.
 const ALONE: usize = 720;
 
+/// A chart is laid along the axes where more than this share of its border then lies along them: more than a triangle of equal sides has.
+const ALIGNED: f64 = 0.35;
+/// What is up to so far from an axis counts as along it, in radians.
+const ALONG: f64 = PI / 180.0;
+
 /// Cosine and sine of the base angles of a chart; the other poses are quarter turns of these.
 ///
-/// The first lays the minimum-area rectangle flat ([`Rotation::Any`]) or is the given pose.
+/// The first lays the minimum-area rectangle flat ([`Rotation::Any`]) or is the given pose. A chart that is laid along the axes has no
+/// other.
 pub(super) fn base_turns(outline: &Outline, rotation: Rotation, angles: usize) -> Vec<[f64; 2]> {
-    if rotation != Rotation::Any {
-        return vec![[1.0, 0.0]];
+    match rotation {
+        Rotation::Aligned => {
+            if let Some(turn) = aligned_turn(outline) {
+                return vec![turn];
+            }
+        }
+        Rotation::Any => (),
+        Rotation::Quarter | Rotation::None => return vec![[1.0, 0.0]],
     }
     let first = flat_turn(outline);
     let turned = |k: usize| {
@@ -23,6 +35,45 @@ pub(super) fn base_turns(outline: &Outline, rotation: Rotation, angles: usize) -
         [first[0] * c - first[1] * s, first[1] * c + first[0] * s]
     };
     std::iter::once(first).chain((1..angles).map(turned)).collect()
+}
+
+/// The turn that lays as much of an outline's border along the axes as can be, where that is much of it. O(n log n).
+pub(super) fn aligned_turn(outline: &Outline) -> Option<[f64; 2]> {
+    let side = |edge: &Edge| outline.points[edge.to as usize] - outline.points[edge.from as usize];
+    // Directions up to quarter turns, and lengths.
+    let mut sides: Vec<(f64, f64)> = outline
+        .edges
+        .iter()
+        .map(side)
+        .filter(|side| side.norm() > 0.0)
+        .map(|side| (side.y.atan2(side.x).rem_euclid(FRAC_PI_2), side.norm()))
+        .collect();
+    sides.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let whole: f64 = sides.iter().map(|side| side.1).sum();
+    // Those from `first` on that are within twice `ALONG` of it, around the quarter turn.
+    let n = sides.len();
+    let ahead = |first: usize, k: usize| (sides[k % n].0 - sides[first].0).rem_euclid(FRAC_PI_2);
+    let (mut last, mut length) = (0, 0.0);
+    let mut best = (0.0, 0..0);
+    for first in 0..n {
+        last = last.max(first);
+        while last < first + n && ahead(first, last) <= 2.0 * ALONG {
+            length += sides[last % n].1;
+            last += 1;
+        }
+        if length > best.0 {
+            best = (length, first..last);
+        }
+        length -= sides[first].1;
+    }
+    let (length, window) = best;
+    if length <= ALIGNED * whole {
+        return None;
+    }
+    let first = window.start;
+    let mean = window.map(|k| sides[k % n].1 * ahead(first, k)).sum::<f64>() / length;
+    let (sin, cos) = (sides[first].0 + mean).sin_cos();
+    Some([cos, -sin])
 }
 
 /// The turn in which a chart alone fits a rectangle of `inner` width and height at the largest scale:
@@ -41,7 +92,7 @@ pub(super) fn turn_alone(outline: &Outline, inner: [f64; 2]) -> [f64; 2] {
     };
     let [c, s] = flat_turn(outline);
     let half_turn = (0..ALONE).map(|k| {
-        let (sin, cos) = (k as f64 * std::f64::consts::PI / ALONE as f64).sin_cos();
+        let (sin, cos) = (k as f64 * PI / ALONE as f64).sin_cos();
         [c * cos - s * sin, s * cos + c * sin]
     });
     let mut best = (scale([c, s]), [c, s]);
@@ -190,6 +241,35 @@ mod tests {
     }
 
     #[test]
+    fn charts_with_straight_borders_are_laid_along_the_axes_and_round_ones_at_any_angle() {
+        // An L, turned by any angle.
+        let corners = [[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]];
+        for angle in [0.0_f64, 0.3, 0.8, 1.2, FRAC_PI_2 - 1e-9, 4.0] {
+            let (s, c) = angle.sin_cos();
+            let points = corners.map(|[x, y]| Point2::new(c * x - s * y, s * x + c * y));
+            let triangles = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
+            let o = Outline::new(&PackItem { points: &points, triangles: &triangles }, 0).expect("valid");
+            let turns = base_turns(&o, Rotation::Aligned, 5);
+            assert_eq!(turns.len(), 1, "no other angle");
+            let [c, s] = turns[0];
+            for edge in &o.edges {
+                let side = o.points[edge.to as usize] - o.points[edge.from as usize];
+                let turned = [c * side.x - s * side.y, s * side.x + c * side.y];
+                assert!(turned[0].abs().min(turned[1].abs()) < 1e-9, "{turned:?} at {angle}");
+            }
+        }
+        for sides in [3, 12, 40] {
+            let corner = |k: usize| {
+                let (s, c) = (2.0 * PI * k as f64 / f64::from(sides)).sin_cos();
+                Point2::new(c, s)
+            };
+            let round: Vec<_> = (0..sides as usize).map(corner).collect();
+            assert_eq!(aligned_turn(&outline(&round)), None, "{sides} sides");
+            assert_eq!(base_turns(&outline(&round), Rotation::Aligned, 5).len(), 5);
+        }
+    }
+
+    #[test]
     fn turns_are_rotations_and_as_many_as_asked() {
         let points = [Point2::new(0.0, 0.0), Point2::new(3.0, 1.0), Point2::new(1.0, 2.0)];
         let o = outline(&points);
@@ -199,6 +279,8 @@ mod tests {
         assert_eq!(base_turns(&o, Rotation::Any, 1).len(), 1);
         assert_eq!(base_turns(&o, Rotation::Quarter, 3), vec![[1.0, 0.0]]);
         let empty = Outline::new(&PackItem { points: &[], triangles: &[] }, 0).expect("empty");
-        assert_eq!(base_turns(&empty, Rotation::Any, 1), vec![[1.0, 0.0]]);
+        for rotation in [Rotation::Any, Rotation::Aligned] {
+            assert_eq!(base_turns(&empty, rotation, 1), vec![[1.0, 0.0]]);
+        }
     }
 }

@@ -200,7 +200,9 @@ fn check(charts: &[Chart], settings: &PackSettings, packed: &Packed) -> f64 {
 fn margins_hold_for_every_kind_of_chart() {
     let sizes = [(256, 256), (400, 150), (97, 311)];
     for (n, margin) in [0.0, 1.0, 2.5, 8.0].into_iter().enumerate() {
-        for (m, rotation) in [Rotation::Any, Rotation::Quarter, Rotation::None].into_iter().enumerate() {
+        for (m, rotation) in
+            [Rotation::Aligned, Rotation::Any, Rotation::Quarter, Rotation::None].into_iter().enumerate()
+        {
             let (width, height) = sizes[(n + m) % sizes.len()];
             let settings = PackSettings { margin_texels: margin, width, height, rotation, quality: Quality::Fast };
             let charts = mixture(18 + 6 * m, (10 * n + m) as u64);
@@ -262,7 +264,7 @@ fn the_same_for_any_number_of_threads() {
 #[test]
 fn orientation_and_size_are_kept() {
     let charts = mixture(12, 8);
-    let rotations = [Rotation::Any, Rotation::Quarter, Rotation::None];
+    let rotations = [Rotation::Aligned, Rotation::Any, Rotation::Quarter, Rotation::None];
     for (rotation, width) in rotations.into_iter().flat_map(|r| [(r, 512), (r, 700)]) {
         let packed = packed(&charts, &PackSettings { rotation, width, ..square(512, 1.0) });
         assert_eq!(packed.specks, 0);
@@ -277,7 +279,7 @@ fn orientation_and_size_are_kept() {
             }
             let exact = [pose.cos, pose.sin].map(f64::abs);
             match rotation {
-                Rotation::Any => {}
+                Rotation::Aligned | Rotation::Any => {}
                 Rotation::Quarter => assert!(exact == [1.0, 0.0] || exact == [0.0, 1.0]),
                 Rotation::None => assert_eq!([pose.cos, pose.sin], [1.0, 0.0]),
             }

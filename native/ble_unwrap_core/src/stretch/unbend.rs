@@ -22,8 +22,10 @@ const RINGS: [usize; 3] = [2, 5, 12];
 /// What the other halves count beside the faces, area by area: at first as much, and less where that takes a chart over
 /// its limit.
 const WEIGHTS: [f64; 3] = [1.0, 0.1, 0.01];
-/// Where all bent quads together do so still, so many at most are mended one by one.
+/// So many quads at most that are bent after all have been mended together are mended one by one.
 const MOST_SINGLY: usize = 16;
+/// What the other halves count there.
+const SINGLE_WEIGHTS: [f64; 3] = [0.01, 1.0, 100.0];
 /// Quads that are crowded but not bent are left alone where they are more than this share of all: that is then how the surface
 /// is, and relaxing them would cost as much as another minimisation of the chart.
 const MOST_CROWDED: f64 = 0.1;
@@ -77,29 +79,31 @@ pub(crate) fn unbend(
     if bad.is_empty() {
         return Ok(None);
     }
-    let found = |uv: Vec<Point2<f64>>| Unbent { left: halves.bent(&uv).len(), uv };
     let mut mending = Mending { mesh, rest, halves: halves.clone(), settings, progress };
-    let mut lightest = None;
+    let (mut best, mut lightest) = (None, None);
     for weight in WEIGHTS {
         mending.halves = halves.weighing(weight);
         lightest = mending.mend(&uv, &bad)?;
-        if let Some(mended) = lightest.take_if(|uv| is_allowed(uv)) {
-            return Ok(Some(found(mended)));
+        best = lightest.take_if(|uv| is_allowed(uv));
+        if best.is_some() {
+            break;
         }
     }
-    let settled = lightest.map(|uv| mending.settle(&uv)).transpose()?.flatten();
-    if let Some(settled) = settled.filter(|uv| is_allowed(uv)) {
-        return Ok(Some(found(settled)));
+    if best.is_none() {
+        best = lightest.map(|uv| mending.settle(&uv)).transpose()?.flatten().filter(|uv| is_allowed(uv));
     }
-    // What can be had of them.
-    let mut best = None;
-    for &quad in bent.iter().take(MOST_SINGLY) {
-        let from = best.as_ref().unwrap_or(&uv);
-        if halves.is_bent(quad, from) {
-            best = mending.mend(from, &[quad])?.filter(|uv| is_allowed(uv)).or(best);
+    // What can be had of those that are left.
+    let left = halves.bent(best.as_ref().unwrap_or(&uv));
+    for &quad in left.iter().take(MOST_SINGLY) {
+        for weight in SINGLE_WEIGHTS {
+            let from = best.as_ref().unwrap_or(&uv);
+            if halves.is_bent(quad, from) {
+                mending.halves = halves.weighing(weight);
+                best = mending.mend(from, &[quad])?.filter(|uv| is_allowed(uv)).or(best);
+            }
         }
     }
-    Ok(best.map(found))
+    Ok(best.map(|uv| Unbent { left: halves.bent(&uv).len(), uv }))
 }
 
 /// What mending works on.
