@@ -12,6 +12,7 @@ use super::level::OnCoarse;
 use super::moves::hand_over::hand_over;
 use super::moves::join::Which;
 use super::moves::split;
+use super::symmetric;
 use super::whole::Whole;
 
 /// Components of more vertices are charted on a coarse mesh.
@@ -36,7 +37,14 @@ pub(crate) fn charts(
     let mut rungs = Rungs::default();
     let is_large = whole.mesh.vertex_count() > COARSE_ABOVE && settings.coarse;
     // What unrolls needs no trials that a coarse mesh would make cheap, and has its edges on the fine one.
-    let unrolling = is_large.then(|| split::unrolling_parts(whole, settings)).flatten();
+    let unrolling = split::unrolling_parts(whole, settings);
+    if unrolling.is_none()
+        && let Some(mirror) = symmetric::mirror(whole, settings, run)?
+        && let Some(mut charts) = symmetric::charts(whole, &mirror, settings, charted, &mut rungs, run)?
+    {
+        rename(&mut charts, faces);
+        return Ok((charts, rungs));
+    }
     let mut charts = if is_large && unrolling.is_none() {
         let coarse = OnCoarse::new(fine, settings, run)?;
         let parts = coarse.parts(&mut rungs, run)?;
@@ -45,7 +53,8 @@ pub(crate) fn charts(
         let charting = coarse.polish(parts, &done, &mut rungs, run)?;
         fine.join(charting, Which::AfterSplits { most_faces: FINE_UNION }, settings, &mut rungs, run)?
     } else {
-        let patches = unrolling.unwrap_or_else(|| vec![whole.clone()]);
+        // A small one is left to the search as it is: it may also unroll in fewer parts.
+        let patches = unrolling.filter(|_| is_large).unwrap_or_else(|| vec![whole.clone()]);
         // A large union is as costly to embed whether or not its parts unroll.
         let which = if is_large { Which::every_on_fine(FINE_UNION) } else { Which::EVERY };
         let charts = fine.charts(patches, which, settings, &mut rungs, &|faces| charted.add(faces, 1.0), run)?;
@@ -53,8 +62,13 @@ pub(crate) fn charts(
         fine.close(charts, settings, &mut rungs, run)?
     };
     charts = hand_over(&whole.mesh, &whole.polygon, charts, settings, &mut rungs, run)?;
+    rename(&mut charts, faces);
+    Ok((charts, rungs))
+}
+
+/// Names the faces of charts of a component as they are named on the surface.
+fn rename(charts: &mut [Chart], faces: &[FaceId]) {
     for f in charts.iter_mut().flat_map(|c| &mut c.patch.faces) {
         *f = faces[f.index()];
     }
-    Ok((charts, rungs))
 }

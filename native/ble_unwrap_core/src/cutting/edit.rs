@@ -33,6 +33,11 @@ impl Edit {
         if cutting.is_seam(h) { !has(&self.glue) } else { has(&self.open) }
     }
 
+    /// Both sides of the seams that will be none.
+    pub(super) fn glued(&self) -> &[HalfedgeId] {
+        &self.glue
+    }
+
     /// How much seam it glues.
     pub(super) fn glued_length(&self, cutting: &Cutting<'_>) -> f64 {
         0.5 * self.glue.iter().map(|&h| cutting.seam_length(h)).sum::<f64>()

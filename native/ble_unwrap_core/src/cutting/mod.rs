@@ -20,6 +20,7 @@ mod moves;
 mod rigid_motion;
 mod search;
 mod state;
+mod symmetric;
 mod trial;
 mod whole;
 

@@ -15,6 +15,7 @@ mod index;
 mod input;
 mod irregular;
 pub(crate) mod measure;
+mod mirror;
 mod orient;
 mod quad;
 #[cfg(test)]
@@ -31,5 +32,6 @@ pub(crate) use condition::{ConditionOptions, Surface, condition};
 pub(crate) use groups::Groups;
 pub(crate) use index::{FaceId, HalfedgeId, VertexId};
 pub use input::{MeshError, MeshInput};
+pub(crate) use mirror::{Mirror, mirror};
 pub(crate) use quad::{Quad, is_convex};
 pub(crate) use tri_mesh::{Topology, TriMesh};

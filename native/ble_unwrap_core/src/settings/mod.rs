@@ -67,6 +67,21 @@ choices!(Moves {
     All: "all", "All", "Charts may be cut open, unfolded and joined along a part of their border, too.";
 });
 
+/// Whether charts of mirrored surfaces are mirrored, too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Symmetry {
+    /// Where a connected piece has a mirror plane along edges, its seams are mirrored, too.
+    Auto,
+    /// Seams are found without regard to it.
+    Off,
+}
+
+choices!(Symmetry {
+    Auto: "auto", "Auto", "Where a piece has a mirror plane along edges, so have its seams.";
+    Off: "off", "Off", "Seams are found without regard to mirror planes.";
+});
+
 /// How charts are scaled relative to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -155,6 +170,9 @@ pub struct Settings {
     /// outside, weighted with the cosine, that rays from there reach. In the mean over a component it costs what its length does.
     /// With 0 all places are alike.
     pub hide_seams: f64,
+    /// Whether charts of mirrored surfaces are mirrored, too. A mirror plane is one that takes every vertex of a connected piece to
+    /// another, to a thousandth of its size, and every polygon to another. UVs are not mirrored: each half has its own place.
+    pub symmetry: Symmetry,
     /// What happens to the holes of charts.
     pub holes: Holes,
     /// How charts are scaled relative to each other.
@@ -189,6 +207,7 @@ impl Default for Settings {
             moves: Moves::All,
             stretch_price: DEFAULT_STRETCH_PRICE,
             hide_seams: 2.0,
+            symmetry: Symmetry::Auto,
             holes: Holes::Keep,
             chart_scale: ChartScale::Uniform,
             together_max: 0,
@@ -217,6 +236,7 @@ impl Settings {
             moves: Moves::Join,
             stretch_price: 0.0,
             hide_seams: 0.0,
+            symmetry: Symmetry::Off,
             segmentation: SegmentationSettings::paper(),
             together_max: PAPER_TOGETHER_MAX,
             geodesics: GeodesicSettings::paper(),
