@@ -141,6 +141,8 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     coarse: declared("coarse")
     stretch_price: declared("stretch_price", soft_max=100.0, step=100, precision=2)
     hide_seams: declared("hide_seams", soft_max=4.0, step=10, precision=2)
+    # In Blender figures look along -Y.
+    front: declared("front", default="-Y")
     symmetry: declared("symmetry")
     moves: declared("moves")
     holes: declared("holes")
@@ -189,7 +191,7 @@ CLOUD_SETTINGS = ("neighbours",)
 MAIN_SETTINGS = ("stretch_limit", "texture_size", "margin", "rotation", "use_seams", "use_selection")
 ADVANCED_SETTINGS = (
     ("Result", ("uv_map", "uv_map_name", "correct_aspect", "use_original_bounds", "move_pinned", "mark_seams")),
-    ("Borders", ("follow_seams", "follow_sharp", "follow_materials", "crease_weight", "hide_seams", "symmetry")),
+    ("Borders", ("follow_seams", "follow_sharp", "follow_materials", "crease_weight", "hide_seams", "front", "symmetry")),
     (
         "Charts",
         (

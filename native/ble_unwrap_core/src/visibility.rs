@@ -56,6 +56,29 @@ pub(crate) fn of_vertices(
     Ok(sample.spread(mesh, &of_sample))
 }
 
+/// Visibilities for one who looks from a direction most of the time: as they are where the surface faces that way, two thirds where it faces
+/// sideways, and one third where it faces away. O(n).
+pub(crate) fn from_the_front(
+    mesh: &TriMesh,
+    positions: &[Point3<f64>],
+    front: Vector3<f64>,
+    visibility: &[f32],
+) -> Vec<f32> {
+    let facing = |v: VertexId| normal(mesh, positions, v).map_or(0.0, |normal| normal.dot(&front));
+    #[expect(clippy::cast_possible_truncation, reason = "a share")]
+    let seen = |(v, visible): (VertexId, &f32)| visible * ((2.0 + facing(v)) / 3.0) as f32;
+    mesh.vertices().zip(visibility).map(seen).collect()
+}
+
+/// The mean normal of the faces at a vertex, by area; `None` where they have none.
+fn normal(mesh: &TriMesh, positions: &[Point3<f64>], v: VertexId) -> Option<Vector3<f64>> {
+    let area = |h: HalfedgeId| {
+        let [a, b, c] = mesh.triangle(h.face()).map(|v| positions[v.index()]);
+        (b - a).cross(&(c - a))
+    };
+    mesh.outgoing(v).map(area).sum::<Vector3<f64>>().try_normalize(f64::MIN_POSITIVE)
+}
+
 /// The triangles of a model, to be met by rays.
 struct Scene<'a> {
     mesh: &'a TriMesh,
@@ -106,11 +129,7 @@ impl<'a> Scene<'a> {
     /// The normal at a vertex and a direction at right angles to it, which turn with the model; `None` where there is no area.
     fn frame(&self, v: VertexId) -> Option<(Vector3<f64>, Vector3<f64>)> {
         let at = |v: VertexId| self.positions[v.index()];
-        let area = |h: HalfedgeId| {
-            let [a, b, c] = self.mesh.triangle(h.face()).map(at);
-            (b - a).cross(&(c - a))
-        };
-        let normal = self.mesh.outgoing(v).map(area).sum::<Vector3<f64>>().try_normalize(f64::MIN_POSITIVE)?;
+        let normal = normal(self.mesh, &self.positions, v)?;
         let side = at(self.mesh.to(self.mesh.an_outgoing(v))) - at(v);
         let along = (side - normal * normal.dot(&side)).try_normalize(f64::MIN_POSITIVE)?;
         Some((normal, along))
@@ -266,6 +285,16 @@ mod tests {
         let around = torus.vertices().filter(|&v| same_ring(v, first)).map(|v| values[v.index()]);
         let (low, high) = around.fold((f32::MAX, f32::MIN), |(low, high), x| (low.min(x), high.max(x)));
         assert!(high - low < 0.15, "alike places look alike: {low} to {high}");
+    }
+
+    #[test]
+    fn from_the_front_the_front_is_seen_most() {
+        let ball = test_surfaces::sphere(2);
+        let all = vec![1.0; ball.vertex_count()];
+        let seen = from_the_front(&ball, ball.positions(), Vector3::new(0.0, -1.0, 0.0), &all);
+        for (p, seen) in ball.positions().iter().zip(seen) {
+            assert!((f64::from(seen) - (2.0 - p.y / p.coords.norm()) / 3.0).abs() < 0.02, "{p} {seen}");
+        }
     }
 
     #[test]

@@ -67,6 +67,46 @@ choices!(Moves {
     All: "all", "All", "Charts may be cut open, unfolded and joined along a part of their border, too.";
 });
 
+/// Which side of a mesh is looked at most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "each is a direction along an axis of the mesh")]
+pub enum Front {
+    /// No side more than another.
+    None,
+    X,
+    NegativeX,
+    Y,
+    NegativeY,
+    Z,
+    NegativeZ,
+}
+
+choices!(Front {
+    None: "none", "None", "No side more than another.";
+    X: "x", "X", "Seams are drawn away from what faces along X.";
+    NegativeX: "-x", "-X", "Seams are drawn away from what faces against X.";
+    Y: "y", "Y", "Seams are drawn away from what faces along Y.";
+    NegativeY: "-y", "-Y", "Seams are drawn away from what faces against Y, as the faces of figures do in Blender.";
+    Z: "z", "Z", "Seams are drawn away from what faces along Z.";
+    NegativeZ: "-z", "-Z", "Seams are drawn away from what faces against Z.";
+});
+
+impl Front {
+    /// The direction, if there is one.
+    pub(crate) fn direction(self) -> Option<[f64; 3]> {
+        match self {
+            Self::None => None,
+            Self::X => Some([1.0, 0.0, 0.0]),
+            Self::NegativeX => Some([-1.0, 0.0, 0.0]),
+            Self::Y => Some([0.0, 1.0, 0.0]),
+            Self::NegativeY => Some([0.0, -1.0, 0.0]),
+            Self::Z => Some([0.0, 0.0, 1.0]),
+            Self::NegativeZ => Some([0.0, 0.0, -1.0]),
+        }
+    }
+}
+
 /// Whether charts of mirrored surfaces are mirrored, too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -170,6 +210,9 @@ pub struct Settings {
     /// outside, weighted with the cosine, that rays from there reach. In the mean over a component it costs what its length does.
     /// With 0 all places are alike.
     pub hide_seams: f64,
+    /// Which side of the mesh is looked at most: what faces it counts as seen from three times as far as what faces away from it, and
+    /// what faces sideways from twice as far. Has no effect where `hide_seams` is 0.
+    pub front: Front,
     /// Whether charts of mirrored surfaces are mirrored, too. A mirror plane is one that takes every vertex of a connected piece to
     /// another, to a thousandth of its size, and every polygon to another. UVs are not mirrored: each half has its own place.
     pub symmetry: Symmetry,
@@ -207,6 +250,7 @@ impl Default for Settings {
             moves: Moves::All,
             stretch_price: DEFAULT_STRETCH_PRICE,
             hide_seams: 2.0,
+            front: Front::None,
             symmetry: Symmetry::Auto,
             holes: Holes::Keep,
             chart_scale: ChartScale::Uniform,

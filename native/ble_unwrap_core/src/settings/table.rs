@@ -385,6 +385,8 @@ pub static TABLE: &[Setting] = &[
     row("hide_seams", "Hide Seams", Group::Charts, Kind::Real(|s| &mut s.hide_seams, Interval::closed(0.0, 10.0)), "",
         "How strongly seams are drawn to where they are hidden: under chins, behind ears, between limbs. A seam costs as much as \
          this power of how far it can be seen; 0 makes all places alike."),
+    row("front", "Front", Group::Charts, Kind::Choice(|s| &mut s.front), "",
+        "Which side is looked at most."),
     row("symmetry", "Symmetry", Group::Charts, Kind::Choice(|s| &mut s.symmetry), "",
         "Whether seams of mirrored surfaces are mirrored, too."),
     row("moves", "Moves", Group::Charts, Kind::Choice(|s| &mut s.moves), "",

@@ -69,6 +69,10 @@ impl Prepared {
         };
         let bytes = |values: &Vec<f32>| 4 * values.len();
         let compute = || visibility::of_vertices(mesh, &positions, run.progress);
-        run.recall(Kind::Visibility, key, bytes, compute).map(Some)
+        let visibility = run.recall(Kind::Visibility, key, bytes, compute)?;
+        Ok(Some(match settings.front.direction() {
+            Some(front) => Arc::new(visibility::from_the_front(mesh, &positions, front.into(), &visibility)),
+            None => visibility,
+        }))
     }
 }
