@@ -57,7 +57,7 @@ pub(super) fn charts(
     }
     let mut cutting = Cutting::new(mesh, polygon, charts);
     let zip = Zip { limit: settings.stretch_limit };
-    let moves = [&Join { which: Which::EVERY } as &dyn Move, &PartialJoin, &zip];
+    let moves = [&Join { which: Which::EVERY } as &dyn Move, &PartialJoin::MostSeen, &zip];
     let moves = moves.map(|inner| InPlane { inner, mirror });
     let moves: Vec<&dyn Move> = moves.iter().map(|made| made as &dyn Move).collect();
     search(&mut cutting, &mut History::default(), &moves, settings, rungs, run)?;

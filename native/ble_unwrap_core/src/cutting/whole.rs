@@ -73,7 +73,7 @@ impl Whole<'_> {
         rungs: &mut Rungs,
         run: &Run<'_>,
     ) -> Result<Vec<Chart>, Cancelled> {
-        self.search(charts, &[&PartialJoin], settings, rungs, run)
+        self.search(charts, &[&PartialJoin::Longest], settings, rungs, run)
     }
 
     /// Closes cuts of charts of this mesh from their ends on, if all moves are wanted. Not where the limit is over the atlas: what it

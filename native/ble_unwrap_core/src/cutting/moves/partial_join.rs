@@ -6,6 +6,8 @@
 //! leaves was one before, so nothing gets longer. From the two maps so joined the stretch is minimised as ever, and that
 //! is the judge.
 
+use std::ops::Range;
+
 use nalgebra::{Complex, Point2};
 
 use crate::mesh::HalfedgeId;
@@ -14,7 +16,7 @@ use super::super::border::{self, BorderRun};
 use super::super::cost::{LEAST_GLUED, Price};
 use super::super::edit::Edit;
 use super::super::history::{History, MoveKind, Place};
-use super::super::rigid_motion::longest_fit;
+use super::super::rigid_motion::{Motion, longest_fit};
 use super::super::state::{ChartId, Cutting};
 use super::{Move, Proposal, Site, Start};
 
@@ -24,9 +26,18 @@ const FITS: [f64; 2] = [0.08, 0.03];
 /// Failed trials a chart may take part in before it is left alone.
 const MOST_FAILURES: usize = 3;
 
+/// Where a part is wanted that is seen, these shares of it are tried, too, around its middle, if all of it comes to nothing.
+const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+
 /// Two charts as they lie, glued along a part of a run of their border that no guide is on, longest part first. Each chart takes part in at most
 /// [`MOST_FAILURES`] failed trials, so the number of trials is linear in the number of charts.
-pub(crate) struct PartialJoin;
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum PartialJoin {
+    /// Where the border fits best.
+    Longest,
+    /// Where it is seen most: its edges count by their length times the square of what a border counts for there.
+    MostSeen,
+}
 
 impl Move for PartialJoin {
     fn kind(&self) -> MoveKind {
@@ -39,7 +50,7 @@ impl Move for PartialJoin {
         for id in cutting.ids().filter(|&id| is_open(id)) {
             // Each pair is looked at from one side.
             let runs = border::runs(cutting, id, |other| other > id && is_open(other));
-            parts.extend(runs.into_iter().filter_map(|run| part(cutting, history, id, &run)));
+            parts.extend(runs.into_iter().filter_map(|run| self.part(cutting, history, id, &run)));
         }
         parts.sort_by(|a, b| b.length.total_cmp(&a.length).then(a.first.cmp(&b.first)));
         parts.into_iter().map(|part| part.site).collect()
@@ -53,40 +64,70 @@ struct Part {
     site: Site,
 }
 
-/// The longest part of a run where the two charts fit.
-fn part(cutting: &Cutting<'_>, history: &History, id: ChartId, run: &BorderRun) -> Option<Part> {
-    let mesh = cutting.mesh();
-    // Guides say where to cut: all of one, or none.
-    if run.edges.iter().any(|&h| mesh.is_guide(h)) {
-        return None;
+impl PartialJoin {
+    /// The longest part of a run where the two charts fit.
+    fn part(self, cutting: &Cutting<'_>, history: &History, id: ChartId, run: &BorderRun) -> Option<Part> {
+        let mesh = cutting.mesh();
+        // Guides say where to cut: all of one, or none.
+        if run.edges.iter().any(|&h| mesh.is_guide(h)) {
+            return None;
+        }
+        let fit = *FITS.get(history.refusals(MoveKind::PartialJoin, Place::between(id, run.beyond)))?;
+        let [one, other] = [cutting.chart(id)?.patch.area(), cutting.chart(run.beyond)?.patch.area()];
+        // Of a whole loop any part may be glued, wherever it begins, but for two edges at least.
+        let edges = if run.is_loop { run.edges.repeat(2) } else { run.edges.clone() };
+        let most_edges = if run.is_loop { run.edges.len().saturating_sub(2) } else { run.edges.len() };
+        let (first, last) = (*edges.first()?, *edges.last()?);
+        let number = |p: Point2<f64>| Complex::new(p.x, p.y);
+        // On this side an edge starts where the one beyond ends.
+        let here = edges.iter().map(|&h| cutting.start(h)).chain([cutting.end(last)]);
+        let there = [cutting.end(mesh.twin(first))].into_iter();
+        let there = there.chain(edges.iter().map(|&h| cutting.start(mesh.twin(h))));
+        let points: Vec<[Complex<f64>; 2]> = here.zip(there).map(|(p, q)| [number(p), number(q)]).collect();
+        let lengths: Vec<f64> = edges.iter().map(|&h| self.length(cutting, h)).collect();
+        let window = longest_fit(&points, &lengths, most_edges, fit)?;
+        if window.length < LEAST_GLUED * one.min(other).sqrt() {
+            return None;
+        }
+        let (glue, lengths) = (&edges[window.first..window.last], &lengths[window.first..window.last]);
+        let way = |glue: &[HalfedgeId], motion: Motion| Proposal {
+            edit: Edit::new(mesh, glue, &[]),
+            start: Start::Glued(Some((run.beyond, motion))),
+        };
+        let mut ways = vec![way(glue, window.motion)];
+        if matches!(self, Self::MostSeen) {
+            ways.extend(SHARES[1..].iter().map(|&share| {
+                let glue = &glue[around_the_middle(lengths, share)];
+                way(glue, border::alignment(cutting, glue))
+            }));
+        }
+        let site = Site { place: Place::between(id, run.beyond), charts: vec![id, run.beyond], ways };
+        Some(Part { length: window.length, first: glue[0], site })
     }
-    let fit = *FITS.get(history.refusals(MoveKind::PartialJoin, Place::between(id, run.beyond)))?;
-    let [one, other] = [cutting.chart(id)?.patch.area(), cutting.chart(run.beyond)?.patch.area()];
-    // Of a whole loop any part may be glued, wherever it begins, but for two edges at least.
-    let edges = if run.is_loop { run.edges.repeat(2) } else { run.edges.clone() };
-    let most_edges = if run.is_loop { run.edges.len().saturating_sub(2) } else { run.edges.len() };
-    let (first, last) = (*edges.first()?, *edges.last()?);
-    let number = |p: Point2<f64>| Complex::new(p.x, p.y);
-    // On this side an edge starts where the one beyond ends.
-    let here = edges.iter().map(|&h| cutting.start(h)).chain([cutting.end(last)]);
-    let there = [cutting.end(mesh.twin(first))].into_iter();
-    let there = there.chain(edges.iter().map(|&h| cutting.start(mesh.twin(h))));
-    let points: Vec<[Complex<f64>; 2]> = here.zip(there).map(|(p, q)| [number(p), number(q)]).collect();
-    let lengths: Vec<f64> = edges.iter().map(|&h| mesh.edge_length(h)).collect();
-    let window = longest_fit(&points, &lengths, most_edges, fit)?;
-    let glue = &edges[window.first..window.last];
-    (window.length >= LEAST_GLUED * one.min(other).sqrt()).then(|| Part {
-        length: window.length,
-        first: glue[0],
-        site: Site {
-            place: Place::between(id, run.beyond),
-            charts: vec![id, run.beyond],
-            ways: vec![Proposal {
-                edit: Edit::new(mesh, glue, &[]),
-                start: Start::Glued(Some((run.beyond, window.motion))),
-            }],
-        },
-    })
+
+    /// What an edge counts for.
+    fn length(self, cutting: &Cutting<'_>, h: HalfedgeId) -> f64 {
+        let mesh = cutting.mesh();
+        match self {
+            Self::Longest => mesh.edge_length(h),
+            Self::MostSeen => mesh.edge_length(h) * mesh.border_cost(h).powi(2),
+        }
+    }
+}
+
+/// The edges around the middle of some, by length, that have about a share of it, and one at least.
+fn around_the_middle(lengths: &[f64], share: f64) -> Range<usize> {
+    let side = 0.5 * (1.0 - share) * lengths.iter().sum::<f64>();
+    // How many edges fit into what is left over on a side.
+    let left_over = |lengths: &mut dyn Iterator<Item = &f64>| {
+        let sums = lengths.scan(0.0, |sum, length| {
+            *sum += length;
+            Some(*sum)
+        });
+        sums.take_while(|sum| *sum <= side).count()
+    };
+    let first = left_over(&mut lengths.iter()).min(lengths.len().saturating_sub(1));
+    first..(lengths.len() - left_over(&mut lengths.iter().rev())).max(first + 1)
 }
 
 #[cfg(test)]
@@ -104,6 +145,20 @@ mod tests {
 
     use super::super::super::divide::divide;
     use super::super::super::search::search;
+
+    #[test]
+    fn what_is_around_the_middle_is_so_by_length_and_never_nothing() {
+        let lengths = [4.0, 1.0, 1.0, 1.0, 1.0];
+        assert_eq!(around_the_middle(&lengths, 1.0), 0..5);
+        assert_eq!(around_the_middle(&lengths, 0.5), 0..3, "the first is longer than what is left over on its side");
+        assert_eq!(around_the_middle(&[1.0; 8], 0.25), 3..5);
+        for share in [0.9, 0.5, 0.125, 0.0] {
+            for n in 1..6 {
+                let found = around_the_middle(&lengths[..n], share);
+                assert!(!found.is_empty() && found.end <= n);
+            }
+        }
+    }
 
     fn settings(stretch_limit: f64) -> Settings {
         Settings { stretch_limit, ..Settings::default() }
@@ -130,7 +185,7 @@ mod tests {
         let (count, progress, mut rungs) = (charts.len(), Progress::new(), Rungs::default());
         let run = Run::new(&progress, None);
         let mut cutting = Cutting::new(mesh, &polygon, charts);
-        search(&mut cutting, &mut History::default(), &[&PartialJoin], settings, &mut rungs, &run)
+        search(&mut cutting, &mut History::default(), &[&PartialJoin::Longest], settings, &mut rungs, &run)
             .expect("not cancelled");
         cutting.check_invariants().expect("sound");
         let joined = cutting.into_charts();
