@@ -10,6 +10,7 @@ mod attempt;
 mod border;
 mod charted;
 mod component;
+mod copied;
 mod cost;
 mod divide;
 mod edit;
@@ -22,6 +23,7 @@ mod search;
 mod state;
 mod symmetric;
 mod trial;
+mod twins;
 mod whole;
 
 use std::cmp::Reverse;
@@ -40,6 +42,7 @@ use crate::settings::{ChartScale, LimitOver, Moves, Settings};
 use atlas_limit::join_within_atlas;
 use charted::Charted;
 use moves::across::cut_across;
+use twins::twins;
 
 pub(crate) use cost::Price;
 pub(crate) use divide::divide;
@@ -65,19 +68,37 @@ pub(crate) fn cut(
     };
     let polygon = &surface.polygon;
     let charted = Charted::new(run.progress, mesh.face_count());
-    let of_component = |component: usize| {
-        let faces = components.group(component);
-        (component, charts_of(&whole(mesh, polygon, faces), faces, settings, &charted, run))
-    };
+    let patch_of = |component: usize| whole(mesh, polygon, components.group(component));
+    let of_component =
+        |component: usize| charts_of(&patch_of(component), components.group(component), settings, &charted, run);
+    let twins = twins(components, &patch_of, settings, run.progress)?;
     // The largest first, so that no long one starts last.
     let mut order: Vec<usize> = (0..components.len()).collect();
     order.sort_by_key(|&component| Reverse(components.group(component).len()));
-    let mut made: Vec<(usize, Result<Arc<Made>, Cancelled>)> =
-        order.into_par_iter().with_max_len(1).map(of_component).collect();
-    made.sort_unstable_by_key(|m| m.0);
+    let (copies, originals): (Vec<usize>, Vec<usize>) = order.into_iter().partition(|&c| twins[c].is_some());
+    let mut made: Vec<Option<Arc<Made>>> = vec![None; components.len()];
+    let in_parallel = |which: Vec<usize>, of: &(dyn Fn(usize) -> Result<Arc<Made>, Cancelled> + Sync)| {
+        let found: Vec<_> = which.into_par_iter().with_max_len(1).map(|component| (component, of(component))).collect();
+        found.into_iter().map(|(component, found)| Ok((component, found?))).collect::<Result<Vec<_>, Cancelled>>()
+    };
+    for (component, found) in in_parallel(originals, &of_component)? {
+        made[component] = Some(found);
+    }
+    let copied = in_parallel(copies, &|component| {
+        run.progress.check()?;
+        let original = twins[component].as_ref().and_then(|twin| Some((twin, made[twin.original].as_ref()?)));
+        let Some((twin, charts)) = original else { return of_component(component) };
+        let [there, here] = [twin.original, component].map(|c| (patch_of(c), components.group(c)));
+        let copied = twin.charts((&there.0, there.1), &charts.0, (&here.0, here.1), settings, run)?;
+        let Some(copied) = copied else { return of_component(component) };
+        charted.add(components.group(component).len() as f64, 1.0);
+        Ok(Arc::new(copied))
+    })?;
+    for (component, found) in copied {
+        made[component] = Some(found);
+    }
     let (mut charts, mut rungs) = (Vec::new(), Rungs::default());
-    for (_, component) in made {
-        let component = component?;
+    for component in made.into_iter().flatten() {
         rungs.add(&component.1);
         match Arc::try_unwrap(component) {
             Ok((more, _)) => charts.extend(more),

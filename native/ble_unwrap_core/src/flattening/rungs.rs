@@ -39,6 +39,10 @@ pub(crate) enum Rung {
     Zip,
     /// A few polygons crushed at a border were handed over it.
     Recut,
+    /// One half of a mirrored component was charted, and the other got mirror images.
+    Mirrored,
+    /// A component that is like another got copies of its charts.
+    Copied,
     /// Quads that came out bent were made convex.
     Unbend,
     /// Triangles stretched far more than the others of a chart were relaxed.
@@ -46,7 +50,7 @@ pub(crate) enum Rung {
 }
 
 impl Rung {
-    const ALL: [Self; 20] = [
+    const ALL: [Self; 22] = [
         Self::Plane,
         Self::Unfold,
         Self::Projection,
@@ -65,6 +69,8 @@ impl Rung {
         Self::Merge,
         Self::Zip,
         Self::Recut,
+        Self::Mirrored,
+        Self::Copied,
         Self::Unbend,
         Self::Relax,
     ];
@@ -91,6 +97,8 @@ impl Rung {
             Self::Merge => "merge",
             Self::Zip => "zip",
             Self::Recut => "recut",
+            Self::Mirrored => "mirrored",
+            Self::Copied => "copied",
             Self::Unbend => "unbend",
             Self::Relax => "relax",
         }
