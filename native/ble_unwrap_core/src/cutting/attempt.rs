@@ -36,6 +36,20 @@ pub(super) fn as_one(
     Attempt::new(&Measured::new(patch, None, settings, run), settings, run).run(rungs)
 }
 
+/// A patch as one chart from its embedding, without cuts; `None` where that is over the limit.
+pub(super) fn embedded(
+    patch: &Patch,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    run: &Run<'_>,
+) -> Result<Option<Chart>, Cancelled> {
+    let (distances, _) = &*analyse(patch, settings, run)?;
+    Ok(match flattening::flatten(patch, distances, settings, rungs, run)? {
+        Flattened::Flat(flat) => Some(flat.into_chart(patch.clone())),
+        Flattened::Near(_) | Flattened::Refused => None,
+    })
+}
+
 /// Whether a patch of some topology may be a chart as it is.
 pub(super) fn may_be_chart(topology: Topology, settings: &Settings) -> bool {
     topology.is_chart() && (settings.holes == Holes::Keep || topology.loops == 1)

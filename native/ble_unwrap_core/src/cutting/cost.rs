@@ -82,11 +82,19 @@ pub(crate) struct Price {
     area: f64,
     /// [`Settings::stretch_price`].
     stretch: f64,
+    /// Whether what unrolls may be bent where that is worth it.
+    may_bend: bool,
 }
 
 impl Price {
     pub(crate) fn new(mesh: &TriMesh, settings: &Settings) -> Self {
-        Self { area: measure::total_area(mesh).max(f64::MIN_POSITIVE), stretch: settings.stretch_price }
+        let stretch = settings.stretch_price;
+        Self { area: measure::total_area(mesh).max(f64::MIN_POSITIVE), stretch, may_bend: may_bend(stretch) }
+    }
+
+    /// The same prices where what unrolls is worth no more than what does not: two halves that only their mirror plane keeps apart.
+    pub(super) fn bending(self) -> Self {
+        Self { may_bend: true, ..self }
     }
 
     /// What some length of seam costs.
@@ -126,7 +134,7 @@ impl Price {
         if may_bend(self.stretch) {
             return settings.stretch_limit;
         }
-        if old.iter().all(|chart| unrolls(chart)) {
+        if !self.may_bend && old.iter().all(|chart| unrolls(chart)) {
             return settings.stretch_limit.min(UNROLLED);
         }
         let share = old.iter().map(|chart| chart.patch.area()).sum::<f64>() / self.area;
@@ -138,7 +146,7 @@ impl Price {
     /// Whether some charts are better than those in whose place they would come. That the limit allows it is no reason to bend what
     /// unrolls.
     pub(super) fn is_worth(&self, old: &[&Chart], new: &[Chart]) -> bool {
-        if !may_bend(self.stretch) && old.iter().all(|chart| unrolls(chart)) && !new.iter().all(unrolls) {
+        if !self.may_bend && old.iter().all(|chart| unrolls(chart)) && !new.iter().all(unrolls) {
             return false;
         }
         let before: f64 = old.iter().map(|chart| self.of(chart)).sum();
@@ -278,6 +286,10 @@ mod tests {
         let old: Vec<&Chart> = two.iter().collect();
         assert!(!price(&mesh, 1e-3).is_worth(&old, &bent) && price(&mesh, 0.0).is_worth(&old, &bent));
         assert!(price(&mesh, 1e-3).is_worth(&old, &one));
+        assert!(price(&mesh, 1e-3).bending().is_worth(&old, &bent));
+        let settings = Settings::default();
+        assert!(price(&mesh, 20.0).limit_of_union(&old, 4.0, &settings) <= UNROLLED);
+        assert!(price(&mesh, 20.0).bending().limit_of_union(&old, 4.0, &settings) > 1.05);
     }
 
     #[test]

@@ -91,6 +91,7 @@ pub(super) fn tried(
 ) -> Result<(Verdict, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
     let mut verdict = Verdict::Refused;
+    let price = price.map(|price| if made.may_bend() { price.bending() } else { *price });
     let old: Vec<&Chart> = site.charts.iter().filter_map(|&id| cutting.chart(id)).collect();
     for way in made.ways(cutting, site, run)? {
         let glued = way.edit.glued_length(cutting);

@@ -19,7 +19,7 @@ use super::history::{History, MoveKind};
 use super::moves::join::{Join, Which};
 use super::moves::partial_join::PartialJoin;
 use super::moves::zip::Zip;
-use super::moves::{Move, Proposal, Site};
+use super::moves::{Move, Proposal, Site, Start};
 use super::search::search;
 use super::state::{ChartId, Cutting};
 
@@ -46,7 +46,9 @@ pub(super) fn charts(
     let half = Patch::of_surface(mesh, polygon, faces.clone());
     let half = Patch::whole(half.mesh, half.polygon);
     // Seams and stretch weigh against each other as on the whole, of which a root of the area is longer.
-    let of_half = Settings { stretch_price: settings.stretch_price * 0.5_f64.sqrt(), ..settings.clone() };
+    let stretch_price = settings.stretch_price * 0.5_f64.sqrt();
+    // Of one plane it is seen when it is kept, of others as well their halves would have to be joined.
+    let of_half = Settings { stretch_price, symmetry: Symmetry::Off, ..settings.clone() };
     let (mut charts, steps) = component::charts(&half, &faces, &of_half, charted, run)?;
     rungs.add(&steps);
     let first = Cutting::new(mesh, polygon, charts.clone());
@@ -90,6 +92,11 @@ impl Move for InPlane<'_> {
         self.inner.kind()
     }
 
+    // They were divided for the sake of symmetry, not because they unroll.
+    fn may_bend(&self) -> bool {
+        true
+    }
+
     fn sites(&self, cutting: &Cutting<'_>, history: &History, price: &Price) -> Vec<Site> {
         let mut sites = self.inner.sites(cutting, history, price);
         sites.retain_mut(|site| {
@@ -108,6 +115,12 @@ impl Move for InPlane<'_> {
     fn ways(&self, cutting: &Cutting<'_>, site: &Site, run: &Run<'_>) -> Result<Vec<Proposal>, Cancelled> {
         let mut ways = self.inner.ways(cutting, site, run)?;
         ways.retain(|way| self.is_symmetric(cutting, way));
+        // Borders in the plane are seldom straight in both maps: what is glued all along them may need another start.
+        if self.kind() == MoveKind::Join {
+            let embedded = |way: &Proposal| Proposal { edit: way.edit.clone(), start: Start::Embedded };
+            let anew: Vec<Proposal> = ways.iter().map(embedded).collect();
+            ways.extend(anew);
+        }
         Ok(ways)
     }
 }

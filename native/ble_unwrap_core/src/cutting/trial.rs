@@ -61,6 +61,10 @@ fn flattened(
             let chart = attempt::as_one(&patch, settings, rungs, run)?;
             return Ok(chart.map_or(Verdict::Refused, |chart| Verdict::Charts(vec![chart])));
         }
+        Start::Embedded => {
+            let chart = attempt::embedded(&patch, settings, rungs, run)?;
+            return Ok(chart.map_or(Verdict::Refused, |chart| Verdict::Charts(vec![chart])));
+        }
         Start::Glued(moved) => flattening::sewn(&patch, &drawn(cutting, &patch, *moved), settings, rungs, run)?,
         Start::Lying => flattening::part_of_chart(&patch, positions(cutting, &patch, &[]), settings, rungs, run)?,
         Start::Redrawn(anew) => flattening::lying(&patch, positions(cutting, &patch, anew), settings),

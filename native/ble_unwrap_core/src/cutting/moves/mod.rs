@@ -39,6 +39,8 @@ pub(super) enum Start {
     Redrawn(Vec<(FaceId, Corners)>),
     /// Where its faces lie now, and they may stay there if they are under the limit.
     Lying,
+    /// Wherever an embedding puts it, without further cuts.
+    Embedded,
     /// Wherever an embedding puts it: each patch is made one chart from nothing, and cut as that asks for.
     Anew,
 }
@@ -56,6 +58,11 @@ pub(super) struct Site {
 /// A change of charts.
 pub(super) trait Move: Sync {
     fn kind(&self) -> MoveKind;
+
+    /// Whether charts that unroll may be glued to one that does not, where the price says so.
+    fn may_bend(&self) -> bool {
+        false
+    }
 
     /// Where it may be made, best first. A site that has been refused often enough is none, so that the search ends.
     fn sites(&self, cutting: &Cutting<'_>, history: &History, price: &Price) -> Vec<Site>;
