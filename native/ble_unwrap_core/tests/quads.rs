@@ -86,7 +86,7 @@ fn shapes() -> [(&'static str, PolyMesh); 5] {
         ("voxel blob", voxel_blob(10)),
         ("voxel blob with smooth corners", smoothed(voxel_blob(14), 2)),
         ("twisted tower", twisted_tower(10, 0.35)),
-        ("steep hills", steep_hills(24, 13.0)),
+        ("steep hills", steep_hills(24, 12.0)),
         ("dented ball", dented_ball()),
     ]
 }

@@ -50,6 +50,16 @@ pub(super) fn embedded(
     })
 }
 
+/// Whether a patch unrolls as it is, as a net, or cut open along a tube.
+pub(super) fn unrolls(patch: &Patch, settings: &Settings, run: &Run<'_>) -> bool {
+    let measured = Measured::new(patch, None, settings, run);
+    Attempt::new(&measured, settings, run).without_stretch(&mut Rungs::default()).is_some()
+}
+
+fn is_sphere(topology: Topology) -> bool {
+    topology.loops == 0 && topology.genus() == 0
+}
+
 /// Whether a patch of some topology may be a chart as it is.
 pub(super) fn may_be_chart(topology: Topology, settings: &Settings) -> bool {
     topology.is_chart() && (settings.holes == Holes::Keep || topology.loops == 1)
@@ -87,21 +97,13 @@ impl<'a> Attempt<'a> {
     pub(super) fn run(&self, rungs: &mut Rungs) -> Result<Option<Chart>, Cancelled> {
         let patch = self.patch();
         let may_be_chart = may_be_chart(self.topology, self.settings);
-        let is_closed = self.topology.loops == 0 && self.topology.genus() == 0;
-        if may_be_chart && let Some(flat) = flattening::isometric(patch, rungs) {
-            return Ok(Some(flat.into_chart(patch.clone())));
+        let is_closed = is_sphere(self.topology);
+        if let Some(chart) = self.without_stretch(rungs) {
+            return Ok(Some(chart));
         }
         if may_be_chart || is_closed {
-            if let Some(chart) = self.net(rungs) {
-                return Ok(Some(chart));
-            }
-            if !cost::may_bend(self.settings.stretch_price) {
-                if let Some(chart) = self.unrolled(rungs) {
-                    return Ok(Some(chart));
-                }
-                if split::unrolling_parts(patch, self.settings).is_some() {
-                    return Ok(None);
-                }
+            if !cost::may_bend(self.settings.stretch_price) && split::unrolling_parts(patch, self.settings).is_some() {
+                return Ok(None);
             }
             let chart = self.flat_or_darted(is_closed, rungs)?;
             if chart.is_some() || is_closed {
@@ -121,6 +123,20 @@ impl<'a> Attempt<'a> {
             }
         }
         self.run_cut(self.cut_to_disk(), rungs)
+    }
+
+    /// The patch as it is, as a net, or as the wall of a tube, if one of these unrolls.
+    fn without_stretch(&self, rungs: &mut Rungs) -> Option<Chart> {
+        let patch = self.patch();
+        let may_be_chart = may_be_chart(self.topology, self.settings);
+        if may_be_chart && let Some(flat) = flattening::isometric(patch, rungs) {
+            return Some(flat.into_chart(patch.clone()));
+        }
+        if !may_be_chart && !is_sphere(self.topology) {
+            return None;
+        }
+        let net = self.net(rungs);
+        if net.is_some() || cost::may_bend(self.settings.stretch_price) { net } else { self.unrolled(rungs) }
     }
 
     /// The patch as it is, from its projection or its embedding, or with darts where it bulges.

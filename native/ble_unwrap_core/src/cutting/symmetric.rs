@@ -11,6 +11,7 @@ use crate::mesh::{self, Mirror};
 use crate::progress::Cancelled;
 use crate::settings::{LimitOver, Moves, Settings, Symmetry};
 
+use super::attempt;
 use super::charted::Charted;
 use super::component;
 use super::copied::copied;
@@ -25,8 +26,13 @@ use super::state::{ChartId, Cutting};
 
 /// The mirror plane of a patch, if it is to be charted by halves.
 pub(super) fn mirror(patch: &Patch, settings: &Settings, run: &Run<'_>) -> Result<Option<Mirror>, Cancelled> {
-    // A limit over the atlas joins charts across the plane as it likes.
-    if settings.symmetry == Symmetry::Off || settings.moves < Moves::All || settings.limit_over == LimitOver::Atlas {
+    // Guides say where to cut, and a limit over the atlas joins charts across the plane as it likes.
+    let is_wanted = settings.symmetry == Symmetry::Auto
+        && settings.moves == Moves::All
+        && settings.limit_over == LimitOver::Chart
+        && !patch.mesh.has_guides();
+    // What unrolls does so in its own way.
+    if !is_wanted || attempt::unrolls(patch, settings, run) {
         return Ok(None);
     }
     mesh::mirror(&patch.mesh, &patch.polygon, run.progress)

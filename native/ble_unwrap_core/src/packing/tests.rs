@@ -351,13 +351,15 @@ fn effort_is_bounded() {
 
 #[test]
 fn a_strip_alone_lies_on_the_diagonal() {
-    let settings = square(256, 2.0);
+    let settings = PackSettings { rotation: Rotation::Any, ..square(256, 2.0) };
     let charts = vec![rectangle(100.0, 0.5)];
     let any = packed(&charts, &settings);
     check(&charts, &settings, &any);
     assert!(any.texels_per_unit > 1.35 * 256.0 / 100.0, "density {}", any.texels_per_unit);
-    let none = packed(&charts, &PackSettings { rotation: Rotation::None, ..settings });
-    assert!((none.texels_per_unit - 2.54).abs() < 0.02, "density {}", none.texels_per_unit);
+    for rotation in [Rotation::None, Rotation::Aligned] {
+        let along = packed(&charts, &PackSettings { rotation, ..settings.clone() });
+        assert!((along.texels_per_unit - 2.54).abs() < 0.02, "density {}", along.texels_per_unit);
+    }
 }
 
 #[test]

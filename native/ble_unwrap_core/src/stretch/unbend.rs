@@ -80,17 +80,14 @@ pub(crate) fn unbend(
         return Ok(None);
     }
     let mut mending = Mending { mesh, rest, halves: halves.clone(), settings, progress };
-    let (mut best, mut lightest) = (None, None);
+    let mut best = None;
     for weight in WEIGHTS {
         mending.halves = halves.weighing(weight);
-        lightest = mending.mend(&uv, &bad)?;
-        best = lightest.take_if(|uv| is_allowed(uv));
+        let is_lightest = weight == WEIGHTS[WEIGHTS.len() - 1];
+        best = mending.allowed(mending.mend(&uv, &bad)?, is_lightest, is_allowed)?;
         if best.is_some() {
             break;
         }
-    }
-    if best.is_none() {
-        best = lightest.map(|uv| mending.settle(&uv)).transpose()?.flatten().filter(|uv| is_allowed(uv));
     }
     // What can be had of those that are left.
     let left = halves.bent(best.as_ref().unwrap_or(&uv));
@@ -99,7 +96,7 @@ pub(crate) fn unbend(
             let from = best.as_ref().unwrap_or(&uv);
             if halves.is_bent(quad, from) {
                 mending.halves = halves.weighing(weight);
-                best = mending.mend(from, &[quad])?.filter(|uv| is_allowed(uv)).or(best);
+                best = mending.allowed(mending.mend(from, &[quad])?, true, is_allowed)?.or(best);
             }
         }
     }
@@ -177,6 +174,20 @@ impl Mending<'_> {
             }
         }
         Ok(None)
+    }
+
+    /// A mended map if it may be had, or if it may be had once the whole has less stretch, where that is to be tried.
+    fn allowed(
+        &self,
+        mended: Option<Vec<Point2<f64>>>,
+        settles: bool,
+        is_allowed: &dyn Fn(&[Point2<f64>]) -> bool,
+    ) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
+        match mended {
+            Some(uv) if is_allowed(&uv) => Ok(Some(uv)),
+            Some(uv) if settles => Ok(self.settle(&uv)?.filter(|uv| is_allowed(uv))),
+            _ => Ok(None),
+        }
     }
 
     /// The whole map with less stretch, its quads as they are: by the plain stretch, since every bit counts here.

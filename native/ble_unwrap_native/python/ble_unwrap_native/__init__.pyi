@@ -65,6 +65,12 @@ class _ChartsGroup(TypedDict, total=False):
     """What the limit bounds. "chart": No chart is stretched beyond the limit. "atlas": All charts together keep the limit, while some exceed it, up to fourfold above 1: fewer charts."""
     stretch_price: float
     """How much more seam less stretch is worth: the length of seam for an excess of 1 of the squared stretch. 0 makes seams as short as the limit allows; more gives less stretch and more charts."""
+    hide_seams: float
+    """How strongly seams are drawn to where they are hidden: under chins, behind ears, between limbs. A seam costs as much as this power of how far it can be seen; 0 makes all places alike."""
+    front: Literal["none", "x", "-x", "y", "-y", "z", "-z"]
+    """Which side is looked at most. "none": No side more than another. "x": Seams are drawn away from what faces along X. "-x": Seams are drawn away from what faces against X. "y": Seams are drawn away from what faces along Y. "-y": Seams are drawn away from what faces against Y, as the faces of figures do in Blender. "z": Seams are drawn away from what faces along Z. "-z": Seams are drawn away from what faces against Z."""
+    symmetry: Literal["auto", "off"]
+    """Whether seams of mirrored surfaces are mirrored, too. "auto": Where a piece has a mirror plane along edges, so have its seams. "off": Seams are found without regard to mirror planes."""
     moves: Literal["split", "join", "all"]
     """What the search for charts may do. "split": Patches are split until they keep the stretch limit. "join": Neighbouring charts are joined again where they keep the limit together. "all": Charts may be cut open, unfolded and joined along a part of their border, too."""
     holes: Literal["keep", "cut"]
@@ -145,8 +151,8 @@ class _TextureGroup(TypedDict, total=False):
 
 @type_check_only
 class _PackingGroup(TypedDict, total=False):
-    rotation: Literal["any", "quarter", "none"]
-    """How charts may be turned to pack them tighter. "any": Charts are turned by any angle, which packs tightest. "quarter": Charts are turned by multiples of 90° from how they were flattened, not set upright. "none": Charts stay as they were flattened, at whatever angle that is."""
+    rotation: Literal["aligned", "any", "quarter", "none"]
+    """How charts may be turned to pack them tighter. "aligned": Charts with straight borders lie along the axes, the others at any angle. "any": Charts are turned by any angle, which packs tightest. "quarter": Charts are turned by multiples of 90° from how they were flattened, not set upright. "none": Charts stay as they were flattened, at whatever angle that is."""
 
 @type_check_only
 class _UnwrapSettings(

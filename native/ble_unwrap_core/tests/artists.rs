@@ -1,0 +1,193 @@
+//! What an artist wants of a layout: like parts alike, mirrored seams, hidden seams, straight borders along the axes.
+
+#![expect(missing_docs, reason = "a test")]
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use ble_unwrap_core::settings::{Front, Settings, Symmetry};
+use ble_unwrap_core::{Atlas, MeshInput, Progress, unwrap};
+use ble_unwrap_fixtures::{PolyMesh, capped_cylinder, torus, uv_sphere};
+
+fn unwrapped(mesh: &PolyMesh, settings: &Settings) -> Atlas {
+    let flat = mesh.flat();
+    let input = MeshInput {
+        positions: &mesh.positions,
+        corner_vertices: &flat.corner_vertices,
+        face_offsets: &flat.face_offsets,
+        ..MeshInput::default()
+    };
+    let atlas = unwrap(&input, settings, &Progress::new()).expect("unwraps");
+    assert_eq!((atlas.report.flips, atlas.report.overlaps), (0, 0));
+    assert!(atlas.report.charts_over_limit.is_empty() && atlas.certificate.is_valid());
+    atlas
+}
+
+fn count(atlas: &Atlas, rung: &str) -> usize {
+    atlas.report.rungs.iter().filter(|taken| taken.0 == rung).map(|taken| taken.1).sum()
+}
+
+/// The edges at which UVs on both sides differ, by vertices.
+fn seams(mesh: &PolyMesh, atlas: &Atlas) -> BTreeSet<[u32; 2]> {
+    let mut found: BTreeMap<[u32; 2], Vec<[[f32; 2]; 2]>> = BTreeMap::new();
+    let mut corner = 0;
+    for face in &mesh.faces {
+        let n = face.len();
+        for k in 0..n {
+            let (a, b) = (face[k], face[(k + 1) % n]);
+            let (p, q) = (atlas.uv[corner + k], atlas.uv[corner + (k + 1) % n]);
+            found.entry([a.min(b), a.max(b)]).or_default().push(if a < b { [p, q] } else { [q, p] });
+        }
+        corner += n;
+    }
+    found.into_iter().filter(|(_, sides)| sides.len() == 2 && sides[0] != sides[1]).map(|(edge, _)| edge).collect()
+}
+
+/// A blob with two horns on the right and on the left, the left ones mirror images of the right ones, and nothing else the same.
+fn horned() -> PolyMesh {
+    uv_sphere(32, 20).moved(|[x, y, z]| {
+        let horn = |at: [f64; 3]| {
+            let away = (x.abs() - at[0]).powi(2) + (y - at[1]).powi(2) + (z - at[2]).powi(2);
+            0.8 * (-away / 0.05).exp()
+        };
+        let r = 1.0 + 0.15 * y + 0.1 * (2.0 * z).sin() + horn([0.6, 0.64, 0.48]) + horn([0.8, -0.36, -0.48]);
+        [r * x, r * y * 1.2, r * z]
+    })
+}
+
+#[test]
+fn mirrored_surfaces_have_mirrored_seams() {
+    let mesh = horned();
+    let mirrored: BTreeMap<u32, u32> = {
+        let place = |p: [f64; 3]| p.map(|x| (x * 1e6).round() as i64);
+        let at: BTreeMap<[i64; 3], u32> = mesh.positions.iter().zip(0..).map(|(p, v)| (place(*p), v)).collect();
+        let image = |p: &[f64; 3]| at[&place([-p[0], p[1], p[2]])];
+        mesh.positions.iter().zip(0..).map(|(p, v)| (v, image(p))).collect()
+    };
+    let share = |symmetry: Symmetry| {
+        let atlas = unwrapped(&mesh, &Settings { symmetry, ..Settings::default() });
+        assert_eq!(count(&atlas, "mirrored"), usize::from(symmetry == Symmetry::Auto));
+        let seams = seams(&mesh, &atlas);
+        let image = |[a, b]: &[u32; 2]| [mirrored[a].min(mirrored[b]), mirrored[a].max(mirrored[b])];
+        let kept = seams.iter().filter(|edge| seams.contains(&image(edge))).count();
+        kept as f64 / seams.len() as f64
+    };
+    assert_eq!(share(Symmetry::Auto), 1.0);
+    assert!(share(Symmetry::Off) < 0.9, "else the shape is too easy for this test");
+}
+
+#[test]
+fn a_ring_is_a_strip_cut_where_it_is_hidden() {
+    let mesh = torus(0.35, 48, 24);
+    let atlas = unwrapped(&mesh, &Settings::default());
+    assert_eq!(atlas.report.charts, 1);
+    let away = |v: u32| mesh.positions[v as usize][0].hypot(mesh.positions[v as usize][1]);
+    let seams = seams(&mesh, &atlas);
+    let inner = seams.iter().filter(|[a, b]| away(*a) < 0.66 && away(*b) < 0.66).count();
+    assert!(inner >= 48 && seams.len() <= 48 + 24, "{inner} of {} edges on the inner equator", seams.len());
+}
+
+#[test]
+fn parts_that_are_alike_get_the_same_map_as_quads_or_triangles() {
+    let turn = |mesh: PolyMesh, k: u32, mirror: f64| {
+        let (s, c) = (0.9 * f64::from(k)).sin_cos();
+        mesh.moved(|[x, y, z]| {
+            let x = mirror * x;
+            // In single precision, as in a file.
+            [c * x - s * y + 5.0 * f64::from(k), s * x + c * y, z].map(|x| f64::from(x as f32))
+        })
+    };
+    for triangles in [false, true] {
+        let one = || if triangles { horned().triangulated() } else { horned() };
+        // Turned mirror images have their faces the other way round.
+        let mut back = turn(one(), 3, -1.0);
+        back.faces.iter_mut().for_each(|face| face.reverse());
+        let all = turn(one(), 0, 1.0).joined(&turn(one(), 1, 1.0)).joined(&turn(one(), 2, 1.0)).joined(&back);
+        let atlas = unwrapped(&all, &Settings::default());
+        assert_eq!(count(&atlas, "copied"), 3);
+        let corners: usize = one().faces.iter().map(Vec::len).sum();
+        let area = |part: usize| {
+            let (mut corner, mut areas) = (part * corners, Vec::new());
+            for face in &one().faces {
+                let uv = &atlas.uv[corner..corner + face.len()];
+                let sum = (0..face.len()).map(|k| {
+                    let (p, q) = (uv[k].map(f64::from), uv[(k + 1) % face.len()].map(f64::from));
+                    p[0] * q[1] - p[1] * q[0]
+                });
+                areas.push(sum.sum::<f64>());
+                corner += face.len();
+            }
+            areas.sort_by(f64::total_cmp);
+            areas
+        };
+        let first = area(0);
+        for part in 1..4 {
+            let apart: f64 = area(part).iter().zip(&first).map(|(a, b)| (a - b).abs()).sum();
+            assert!(apart < 0.01 * first.iter().sum::<f64>(), "part {part}: {apart}");
+        }
+    }
+}
+
+#[test]
+fn parts_that_differ_are_charted_by_themselves() {
+    let other = horned().moved(|[x, y, z]| [x, y, if z > 0.9 { z + 0.05 } else { z } + 9.0]);
+    let atlas = unwrapped(&horned().joined(&other), &Settings::default());
+    assert_eq!(count(&atlas, "copied"), 0);
+}
+
+/// How much of the seams faces a direction, in the mean over their length: from -1 to 1.
+fn facing(mesh: &PolyMesh, atlas: &Atlas, front: [f64; 3]) -> f64 {
+    let (mut sum, mut total) = (0.0, 0.0);
+    for edge in seams(mesh, atlas) {
+        let [p, q] = edge.map(|v| mesh.positions[v as usize]);
+        let length = (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
+        let middle = [0, 1, 2].map(|k| 0.5 * (p[k] + q[k]));
+        let norm = middle.iter().map(|x| x * x).sum::<f64>().sqrt();
+        sum += length * (0..3).map(|k| middle[k] * front[k]).sum::<f64>() / norm;
+        total += length;
+    }
+    sum / total
+}
+
+#[test]
+fn seams_keep_away_from_the_front() {
+    let ball = uv_sphere(40, 24).moved(|[x, y, z]| [x, 1.1 * y, 1.2 * z + 0.1 * x * y]);
+    for (front, direction) in
+        [(Front::X, [1.0, 0.0, 0.0]), (Front::NegativeX, [-1.0, 0.0, 0.0]), (Front::Y, [0.0, 1.0, 0.0])]
+    {
+        let settings = Settings { front, symmetry: Symmetry::Off, ..Settings::default() };
+        let got = facing(&ball, &unwrapped(&ball, &settings), direction);
+        assert!(got < -0.3, "{front:?}: {got}");
+        let alike = Settings { hide_seams: 0.0, ..settings };
+        let without = facing(&ball, &unwrapped(&ball, &alike), direction);
+        assert!(got < without, "{front:?}: {got} and {without}");
+    }
+}
+
+#[test]
+fn straight_borders_lie_along_the_axes() {
+    let tube = capped_cylinder(6.0, 32, 12).moved(|[x, y, z]| {
+        let (s, c) = 0.4_f64.sin_cos();
+        [c * x - s * z, y, s * x + c * z]
+    });
+    let atlas = unwrapped(&tube, &Settings::default());
+    let (mut along, mut total) = (0.0, 0.0);
+    let mut corner = 0;
+    let seams = seams(&tube, &atlas);
+    for face in &tube.faces {
+        let n = face.len();
+        for k in 0..n {
+            let (a, b) = (face[k], face[(k + 1) % n]);
+            if seams.contains(&[a.min(b), a.max(b)]) {
+                let (p, q) = (atlas.uv[corner + k], atlas.uv[corner + (k + 1) % n]);
+                let side = [f64::from(q[0] - p[0]).abs(), f64::from(q[1] - p[1]).abs()];
+                total += side[0].hypot(side[1]);
+                if side[0].min(side[1]) < 0.0175 * side[0].max(side[1]) {
+                    along += side[0].hypot(side[1]);
+                }
+            }
+        }
+        corner += n;
+    }
+    // The wall's four sides; the caps are round.
+    assert!(along > 0.6 * total, "{along} of {total}");
+}
