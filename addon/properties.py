@@ -191,7 +191,10 @@ CLOUD_SETTINGS = ("neighbours",)
 MAIN_SETTINGS = ("stretch_limit", "texture_size", "margin", "rotation", "use_seams", "use_selection")
 ADVANCED_SETTINGS = (
     ("Result", ("uv_map", "uv_map_name", "correct_aspect", "use_original_bounds", "move_pinned", "mark_seams")),
-    ("Borders", ("follow_seams", "follow_sharp", "follow_materials", "crease_weight", "hide_seams", "front", "symmetry")),
+    (
+        "Borders",
+        ("follow_seams", "follow_sharp", "follow_materials", "crease_weight", "hide_seams", "front", "symmetry"),
+    ),
     (
         "Charts",
         (

@@ -1,7 +1,5 @@
 //! What an artist wants of a layout: like parts alike, mirrored seams, hidden seams, straight borders along the axes.
 
-#![expect(missing_docs, reason = "a test")]
-
 use std::collections::{BTreeMap, BTreeSet};
 
 use ble_unwrap_core::settings::{Front, Settings, Symmetry};

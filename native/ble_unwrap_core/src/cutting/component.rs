@@ -39,11 +39,14 @@ pub(crate) fn charts(
     // What unrolls needs no trials that a coarse mesh would make cheap, and has its edges on the fine one.
     let unrolling = split::unrolling_parts(whole, settings);
     if unrolling.is_none()
-        && let Some(mirror) = symmetric::mirror(whole, settings, run)?
-        && let Some(mut charts) = symmetric::charts(whole, &mirror, settings, charted, &mut rungs, run)?
+        && let Some(mirror) = symmetric::mirror(whole, is_large, settings, run)?
     {
-        rename(&mut charts, faces);
-        return Ok((charts, rungs));
+        let of_half = |half: &Patch, faces: &[FaceId], once: &Settings| charts(half, faces, once, charted, run);
+        if let Some((mut charts, rungs)) = symmetric::charts(whole, &mirror, settings, &of_half, run)? {
+            charted.add(0.5 * size, 1.0);
+            rename(&mut charts, faces);
+            return Ok((charts, rungs));
+        }
     }
     let mut charts = if is_large && unrolling.is_none() {
         let coarse = OnCoarse::new(fine, settings, run)?;

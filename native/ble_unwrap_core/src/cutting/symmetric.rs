@@ -7,13 +7,11 @@
 use crate::cache::Run;
 use crate::charts::{Chart, Patch};
 use crate::flattening::{Rung, Rungs};
-use crate::mesh::{self, Mirror};
+use crate::mesh::{self, FaceId, Mirror};
 use crate::progress::Cancelled;
 use crate::settings::{LimitOver, Moves, Settings, Symmetry};
 
 use super::attempt;
-use super::charted::Charted;
-use super::component;
 use super::copied::copied;
 use super::cost::Price;
 use super::history::{History, MoveKind};
@@ -24,8 +22,13 @@ use super::moves::{Move, Proposal, Site, Start};
 use super::search::search;
 use super::state::{ChartId, Cutting};
 
-/// The mirror plane of a patch, if it is to be charted by halves.
-pub(super) fn mirror(patch: &Patch, settings: &Settings, run: &Run<'_>) -> Result<Option<Mirror>, Cancelled> {
+/// The mirror plane of a patch, if it is to be charted by halves. A large one is not looked at for whether it is better left in one piece.
+pub(super) fn mirror(
+    patch: &Patch,
+    is_large: bool,
+    settings: &Settings,
+    run: &Run<'_>,
+) -> Result<Option<Mirror>, Cancelled> {
     // Guides say where to cut, and a limit over the atlas joins charts across the plane as it likes.
     let is_wanted = settings.symmetry == Symmetry::Auto
         && settings.moves == Moves::All
@@ -35,18 +38,29 @@ pub(super) fn mirror(patch: &Patch, settings: &Settings, run: &Run<'_>) -> Resul
     if !is_wanted || attempt::unrolls(patch, settings, run) {
         return Ok(None);
     }
-    mesh::mirror(&patch.mesh, &patch.polygon, run.progress)
+    let mirror = mesh::mirror(&patch.mesh, &patch.polygon, run.progress)?;
+    if mirror.is_some() && !is_large && attempt::may_be_chart(patch.mesh.topology(), settings) {
+        // What needs no cut gets none.
+        let stretch_limit = Price::new(&patch.mesh, settings).limit(patch, settings);
+        let worth_it = Settings { stretch_limit, ..settings.clone() };
+        if attempt::embedded(patch, &worth_it, &mut Rungs::default(), run)?.is_some() {
+            return Ok(None);
+        }
+    }
+    Ok(mirror)
 }
+
+/// How the half of a patch is charted, given with the names of its faces.
+pub(super) type OfHalf<'a> = dyn Fn(&Patch, &[FaceId], &Settings) -> Result<(Vec<Chart>, Rungs), Cancelled> + 'a;
 
 /// The charts of a mirrored patch; `None` where the images of charts are none, since polygons there are divided into other triangles.
 pub(super) fn charts(
     whole: &Patch,
     mirror: &Mirror,
     settings: &Settings,
-    charted: &Charted<'_>,
-    rungs: &mut Rungs,
+    of_half: &OfHalf<'_>,
     run: &Run<'_>,
-) -> Result<Option<Vec<Chart>>, Cancelled> {
+) -> Result<Option<(Vec<Chart>, Rungs)>, Cancelled> {
     let (mesh, polygon) = (&whole.mesh, &whole.polygon);
     let faces = mirror.first_half();
     let half = Patch::of_surface(mesh, polygon, faces.clone());
@@ -54,12 +68,11 @@ pub(super) fn charts(
     // Seams and stretch weigh against each other as on the whole, of which a root of the area is longer.
     let stretch_price = settings.stretch_price * 0.5_f64.sqrt();
     // Of one plane it is seen when it is kept, of others as well their halves would have to be joined.
-    let of_half = Settings { stretch_price, symmetry: Symmetry::Off, ..settings.clone() };
-    let (mut charts, steps) = component::charts(&half, &faces, &of_half, charted, run)?;
-    rungs.add(&steps);
+    let once = Settings { stretch_price, symmetry: Symmetry::Off, ..settings.clone() };
+    let (mut charts, mut rungs) = of_half(&half, &faces, &once)?;
     let first = Cutting::new(mesh, polygon, charts.clone());
     for chart in &charts.clone() {
-        let Some(image) = copied(&first, chart, whole, &mirror.likeness, settings, rungs, run)? else {
+        let Some(image) = copied(&first, chart, whole, &mirror.likeness, settings, &mut rungs, run)? else {
             return Ok(None);
         };
         charts.push(image);
@@ -70,8 +83,8 @@ pub(super) fn charts(
     let moves = moves.map(|inner| InPlane { inner, mirror });
     let moves: Vec<&dyn Move> = moves.iter().map(|made| made as &dyn Move).collect();
     rungs.take(Rung::Mirrored);
-    search(&mut cutting, &mut History::default(), &moves, settings, rungs, run)?;
-    Ok(Some(cutting.into_charts()))
+    search(&mut cutting, &mut History::default(), &moves, settings, &mut rungs, run)?;
+    Ok(Some((cutting.into_charts(), rungs)))
 }
 
 /// A move, made only where what comes of it is its own mirror image: between a chart and its image, or along the plane.

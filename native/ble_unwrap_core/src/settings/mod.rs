@@ -70,9 +70,8 @@ choices!(Moves {
 /// Which side of a mesh is looked at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-#[expect(missing_docs, reason = "each is a direction along an axis of the mesh")]
+#[expect(missing_docs, reason = "each is a direction along an axis of the mesh, or none")]
 pub enum Front {
-    /// No side more than another.
     None,
     X,
     NegativeX,
