@@ -190,8 +190,8 @@ def test_surfaces_with_notches_are_open_and_each_is_another():
 
 
 def test_on_four_chosen_sheets_the_model_makes_fewer_charts_than_isomap():
-    """Sheets round whose notches geodesics go, chosen because BLE lays them flat in one piece and classical scaling folds them: the
-    test says that it stays so, not that most sheets are like them."""
+    """Sheets round whose notches geodesics go, chosen because BLE lays them flat in one piece and classical scaling
+    folds them: the test says that it stays so, not that most sheets are like them."""
     chosen = ("comb of 3", "ring with a gap, 0.55", "ramp of 1.5", "ramp of 2.5")
     found = [mesh for mesh in notched.surfaces() if mesh.name in chosen]
     assert len(found) == len(chosen)
