@@ -42,7 +42,7 @@ pub(crate) fn charts(
         && let Some(mirror) = symmetric::mirror(whole, is_large, settings, run)?
     {
         let of_half = |half: &Patch, faces: &[FaceId], once: &Settings| charts(half, faces, once, charted, run);
-        if let Some((mut charts, rungs)) = symmetric::charts(whole, &mirror, settings, &of_half, run)? {
+        if let Some((mut charts, rungs)) = symmetric::charts(whole, &mirror, is_large, settings, &of_half, run)? {
             charted.add(0.5 * size, 1.0);
             rename(&mut charts, faces);
             return Ok((charts, rungs));

@@ -57,6 +57,7 @@ pub(super) type OfHalf<'a> = dyn Fn(&Patch, &[FaceId], &Settings) -> Result<(Vec
 pub(super) fn charts(
     whole: &Patch,
     mirror: &Mirror,
+    is_large: bool,
     settings: &Settings,
     of_half: &OfHalf<'_>,
     run: &Run<'_>,
@@ -80,7 +81,7 @@ pub(super) fn charts(
     let mut cutting = Cutting::new(mesh, polygon, charts);
     let zip = Zip { limit: settings.stretch_limit };
     let moves = [&Join { which: Which::EVERY } as &dyn Move, &PartialJoin::MostSeen, &zip];
-    let moves = moves.map(|inner| InPlane { inner, mirror });
+    let moves = moves.map(|inner| InPlane { inner, mirror, embeds: !is_large });
     let moves: Vec<&dyn Move> = moves.iter().map(|made| made as &dyn Move).collect();
     rungs.take(Rung::Mirrored);
     search(&mut cutting, &mut History::default(), &moves, settings, &mut rungs, run)?;
@@ -91,6 +92,8 @@ pub(super) fn charts(
 struct InPlane<'a> {
     inner: &'a dyn Move,
     mirror: &'a Mirror,
+    /// Whether unions may be embedded, which takes too long for large ones.
+    embeds: bool,
 }
 
 impl InPlane<'_> {
@@ -135,7 +138,7 @@ impl Move for InPlane<'_> {
         let mut ways = self.inner.ways(cutting, site, run)?;
         ways.retain(|way| self.is_symmetric(cutting, way));
         // Borders in the plane are seldom straight in both maps: what is glued all along them may need another start.
-        if self.kind() == MoveKind::Join {
+        if self.embeds && self.kind() == MoveKind::Join {
             let embedded = |way: &Proposal| Proposal { edit: way.edit.clone(), start: Start::Embedded };
             let anew: Vec<Proposal> = ways.iter().map(embedded).collect();
             ways.extend(anew);
