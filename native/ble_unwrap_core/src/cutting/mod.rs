@@ -29,6 +29,7 @@ mod whole;
 use std::cmp::Reverse;
 use std::sync::Arc;
 
+use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::cache::{self, Fingerprint, Kind, Run};
@@ -42,7 +43,7 @@ use crate::settings::{ChartScale, LimitOver, Moves, Settings};
 use atlas_limit::join_within_atlas;
 use charted::Charted;
 use moves::across::cut_across;
-use twins::twins;
+use twins::{Placed, twins};
 
 pub(crate) use cost::Price;
 pub(crate) use divide::divide;
@@ -51,13 +52,15 @@ pub(crate) use divide::divide;
 type Made = (Vec<Chart>, Rungs);
 
 /// Cuts a surface into charts under the stretch limit of `settings`, sorted by lowest face. `components` holds the faces of
-/// each connected piece, ascending, `visibility` how far each vertex can be seen, where that matters.
+/// each connected piece, ascending, `positions` says where the vertices of different pieces are beside each other, in units of the mesh,
+/// and `visibility` how far each vertex can be seen, where that matters.
 ///
 /// # Errors
 /// The caller cancelled, or there is not enough memory.
 pub(crate) fn cut(
     surface: &Surface,
     components: &Groups<FaceId>,
+    positions: &[Point3<f64>],
     visibility: Option<&[f32]>,
     settings: &Settings,
     run: &Run<'_>,
@@ -71,7 +74,17 @@ pub(crate) fn cut(
     let patch_of = |component: usize| whole(mesh, polygon, components.group(component));
     let of_component =
         |component: usize| charts_of(&patch_of(component), components.group(component), settings, &charted, run);
-    let twins = twins(components, &patch_of, settings, run.progress)?;
+    let placed = |component: usize| {
+        let patch = patch_of(component);
+        let mut place = vec![Point3::origin(); patch.mesh.vertex_count()];
+        for (f, local) in components.group(component).iter().zip(patch.mesh.triangles()) {
+            for (v, local) in mesh.triangle(*f).iter().zip(local) {
+                place[local.index()] = positions[v.index()];
+            }
+        }
+        Placed { patch, positions: place }
+    };
+    let twins = twins(components, &placed, settings, run.progress)?;
     // The largest first, so that no long one starts last.
     let mut order: Vec<usize> = (0..components.len()).collect();
     order.sort_by_key(|&component| Reverse(components.group(component).len()));

@@ -68,7 +68,7 @@ pub(super) fn charts(
     let half = Patch::whole(half.mesh, half.polygon);
     // Seams and stretch weigh against each other as on the whole, of which a root of the area is longer.
     let stretch_price = settings.stretch_price * 0.5_f64.sqrt();
-    // Of one plane it is seen when it is kept, of others as well their halves would have to be joined.
+    // Further planes of the half are left alone: each would divide it again, for seams that have to be joined then.
     let once = Settings { stretch_price, symmetry: Symmetry::Off, ..settings.clone() };
     let (mut charts, mut rungs) = of_half(&half, &faces, &once)?;
     let first = Cutting::new(mesh, polygon, charts.clone());

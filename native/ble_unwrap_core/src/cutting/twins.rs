@@ -1,15 +1,17 @@
 //! Components that are like others, which get copies of their charts: hundreds of bolts take the time of one, and are unwrapped alike.
 
+use std::cmp::Reverse;
 use std::collections::HashMap;
 
+use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::cache::Run;
 use crate::charts::{Chart, Patch};
 use crate::flattening::{Rung, Rungs};
-use crate::mesh::{FaceId, Groups, Likeness, Shape};
+use crate::mesh::{self, FaceId, Groups, Likeness, Plane, Shape, VertexId};
 use crate::progress::{Cancelled, Progress};
-use crate::settings::{LimitOver, Moves, Settings};
+use crate::settings::{LimitOver, Moves, Settings, Symmetry};
 
 use super::copied::copied;
 use super::state::Cutting;
@@ -18,6 +20,11 @@ use super::state::Cutting;
 const LEAST_FACES: usize = 8;
 /// A component is compared with so many others at most that look the same by their numbers.
 const MOST_COMPARED: usize = 8;
+/// So many of the largest components are looked at for a mirror plane of the object.
+const MOST_PLANES: usize = 5;
+
+/// What is mirrored in the plane of the object may be out of place by this share of its own extent.
+const MISPLACED: f64 = 0.1;
 
 /// A component that is like another one.
 pub(super) struct Twin {
@@ -27,13 +34,20 @@ pub(super) struct Twin {
     likeness: Likeness,
 }
 
-/// For each component the one before it that it is like, if any. `whole` gives a component as a patch of itself. O(n log n).
+/// A component as a patch of itself, and where its vertices are beside those of others.
+pub(super) struct Placed {
+    pub(super) patch: Patch,
+    pub(super) positions: Vec<Point3<f64>>,
+}
+
+/// For each component the one before it that it is like, if any. Where the object has a mirror plane, that of one of its largest
+/// components, the mirror image in it comes first, so that left and right are mirrored, too. O(n log n).
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
 pub(super) fn twins(
     components: &Groups<FaceId>,
-    whole: &(impl Fn(usize) -> Patch + Sync),
+    placed: &(impl Fn(usize) -> Placed + Sync),
     settings: &Settings,
     progress: &Progress,
 ) -> Result<Vec<Option<Twin>>, Cancelled> {
@@ -47,8 +61,12 @@ pub(super) fn twins(
         by_size.entry(components.group(component).len()).or_default().push(component);
     }
     let groups: Vec<Vec<usize>> = by_size.into_values().filter(|group| group.len() > 1).collect();
+    if groups.is_empty() {
+        return Ok(twins);
+    }
+    let plane = if settings.symmetry == Symmetry::Auto { plane(components, placed, progress)? } else { None };
     let found: Vec<Result<Vec<(usize, Twin)>, Cancelled>> =
-        groups.par_iter().map(|group| twins_among(group, whole, progress)).collect();
+        groups.par_iter().map(|group| twins_among(group, placed, plane.as_ref(), progress)).collect();
     for group in found {
         for (component, twin) in group? {
             twins[component] = Some(twin);
@@ -57,34 +75,77 @@ pub(super) fn twins(
     Ok(twins)
 }
 
+/// The mirror plane of the largest component that has one, of a few.
+fn plane(
+    components: &Groups<FaceId>,
+    placed: &impl Fn(usize) -> Placed,
+    progress: &Progress,
+) -> Result<Option<Plane>, Cancelled> {
+    let mut largest: Vec<usize> = (0..components.len()).collect();
+    largest.sort_by_key(|&component| Reverse(components.group(component).len()));
+    for &component in largest.iter().take(MOST_PLANES) {
+        let Placed { patch, positions } = placed(component);
+        let mirror = mesh::mirror(&patch.mesh, &patch.polygon, progress)?;
+        if let Some(plane) = mirror.and_then(|mirror| mirror.plane(&patch.mesh, &positions)) {
+            return Ok(Some(plane));
+        }
+    }
+    Ok(None)
+}
+
 /// Twins among components of the same number of faces, ascending.
 fn twins_among(
     group: &[usize],
-    whole: &impl Fn(usize) -> Patch,
+    placed: &impl Fn(usize) -> Placed,
+    plane: Option<&Plane>,
     progress: &Progress,
 ) -> Result<Vec<(usize, Twin)>, Cancelled> {
-    let mut originals: Vec<(usize, Patch)> = Vec::new();
+    let mut originals: Vec<(usize, Placed)> = Vec::new();
     let mut twins = Vec::new();
     for &component in group {
-        let patch = whole(component);
-        let Some(shape) = Shape::new(&patch.mesh, &patch.polygon) else { continue };
+        let own = placed(component);
         let mut found = None;
         for (original, other) in &originals {
-            let Some(other) = Shape::new(&other.mesh, &other.polygon) else { continue };
-            for is_mirrored in [true, false] {
-                found = found.or(other.likeness(&shape, is_mirrored, progress)?.map(|likeness| (*original, likeness)));
-            }
+            found = likeness(other, &own, plane, progress)?.map(|likeness| Twin { original: *original, likeness });
             if found.is_some() {
                 break;
             }
         }
         match found {
-            Some((original, likeness)) => twins.push((component, Twin { original, likeness })),
-            None if originals.len() < MOST_COMPARED => originals.push((component, patch)),
+            Some(twin) => twins.push((component, twin)),
+            None if originals.len() < MOST_COMPARED => originals.push((component, own)),
             None => (),
         }
     }
     Ok(twins)
+}
+
+/// The likeness of one component to another: in the mirror plane if there is one, else any.
+fn likeness(
+    here: &Placed,
+    there: &Placed,
+    plane: Option<&Plane>,
+    progress: &Progress,
+) -> Result<Option<Likeness>, Cancelled> {
+    let [a, b] = [here, there].map(|placed| Shape::new(&placed.patch.mesh, &placed.patch.polygon));
+    let (Some(a), Some(b)) = (a, b) else { return Ok(None) };
+    if let Some(plane) = plane {
+        let most = MISPLACED * a.extent();
+        let is_image = |v: VertexId, w: VertexId| {
+            (plane.mirrored(here.positions[v.index()]) - there.positions[w.index()]).norm() <= most
+        };
+        let found = a.likeness(&b, true, is_image, progress)?;
+        if found.is_some() {
+            return Ok(found);
+        }
+    }
+    for is_mirrored in [true, false] {
+        let found = a.likeness(&b, is_mirrored, |_, _| true, progress)?;
+        if found.is_some() {
+            return Ok(found);
+        }
+    }
+    Ok(None)
 }
 
 impl Twin {

@@ -60,10 +60,15 @@ impl<'a> Shape<'a> {
         let middle = Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64);
         let radius: Vec<f64> = points.iter().map(|p| (p - middle).norm()).collect();
         let farthest = mesh.vertices().max_by(|v, w| radius[v.index()].total_cmp(&radius[w.index()]).then(w.cmp(v)))?;
-        let tolerance = 2.0 * TOLERANCE * radius[farthest.index()];
+        let tolerance = TOLERANCE * 2.0 * radius[farthest.index()];
         let mut shape = Self { mesh, polygon, radius, tolerance, start: HalfedgeId::NONE };
         shape.start = mesh.outgoing(farthest).find(|&h| !shape.is_diagonal(h))?;
         Some(shape)
+    }
+
+    /// The distance of the farthest vertex from the middle.
+    pub(crate) fn extent(&self) -> f64 {
+        self.radius.iter().copied().fold(0.0, f64::max)
     }
 
     pub(super) fn is_diagonal(&self, h: HalfedgeId) -> bool {
@@ -121,8 +126,9 @@ impl<'a> Shape<'a> {
         self.mesh.halfedges().filter(|&h| !self.is_diagonal(h)).count()
     }
 
-    /// The likeness of this mesh to another, if they are the same up to a rigid motion or, if that is asked for, a mirror image. It need not
-    /// be found where a mesh looks alike from very many sides. O(n log n).
+    /// The likeness of this mesh to another, if they are the same up to a rigid motion or, if that is asked for, a mirror image; one in
+    /// which each vertex of this mesh may be where it is in the other. It need not be found where a mesh looks alike from very many
+    /// sides. O(n log n).
     ///
     /// # Errors
     /// [`Cancelled`] if `progress` says so.
@@ -130,6 +136,7 @@ impl<'a> Shape<'a> {
         &self,
         other: &Self,
         is_mirrored: bool,
+        may_be: impl Fn(VertexId, VertexId) -> bool,
         progress: &Progress,
     ) -> Result<Option<Likeness>, Cancelled> {
         if self.mesh.halfedge_count() != other.mesh.halfedge_count() || self.side_count() != other.side_count() {
@@ -138,8 +145,10 @@ impl<'a> Shape<'a> {
         self.find(other, is_mirrored, progress, |image| {
             let mut source = vec![HalfedgeId::NONE; other.mesh.halfedge_count()];
             for h in self.mesh.halfedges().filter(|h| !image[h.index()].is_none()) {
-                let source = &mut source[image[h.index()].index()];
-                if !source.is_none() {
+                let there = image[h.index()];
+                let vertex = if is_mirrored { other.mesh.to(there) } else { other.mesh.from(there) };
+                let source = &mut source[there.index()];
+                if !source.is_none() || !may_be(self.mesh.from(h), vertex) {
                     return None;
                 }
                 *source = h;
@@ -245,7 +254,7 @@ mod tests {
 
     fn likeness(a: &(TriMesh, Vec<u32>), b: &(TriMesh, Vec<u32>), is_mirrored: bool) -> Option<Likeness> {
         let [a, b] = [a, b].map(|(mesh, polygon)| Shape::new(mesh, polygon).expect("it has sides"));
-        a.likeness(&b, is_mirrored, &Progress::new()).expect("not cancelled")
+        a.likeness(&b, is_mirrored, |_, _| true, &Progress::new()).expect("not cancelled")
     }
 
     #[test]
@@ -282,6 +291,27 @@ mod tests {
         let marks = original.0.halfedges().map(|h| h.index() == 0 && original.0.is_boundary(h)).collect();
         let guided = (original.0.clone().with_guides(marks), original.1.clone());
         assert!(likeness(&original, &guided, false).is_none() == guided.0.has_guides());
+    }
+
+    #[test]
+    fn of_several_likenesses_one_is_found_that_may_be() {
+        let ball = test_surfaces::sphere(1);
+        let polygon: Vec<u32> = (0..ball.face_count() as u32).collect();
+        let shape = Shape::new(&ball, &polygon).expect("it has sides");
+        let at = |v: VertexId| ball.position(v);
+        // Mirrored in the plane between two neighbours of equal length.
+        let normal = (at(VertexId::new(1)) - at(VertexId::new(0))).normalize();
+        let mirrored = |p: Point3<f64>| p - normal * (2.0 * normal.dot(&p.coords));
+        let is_image = |v: VertexId, w: VertexId| (mirrored(at(v)) - at(w)).norm() < 1e-6;
+        let is_symmetry = ball.vertices().all(|v| ball.vertices().any(|w| is_image(v, w)));
+        let found = shape.likeness(&shape, true, is_image, &Progress::new()).expect("not cancelled");
+        assert_eq!(found.is_some(), is_symmetry);
+        for h in ball.halfedges().take(if is_symmetry { usize::MAX } else { 0 }) {
+            let image = found.as_ref().expect("a likeness").image(h);
+            assert!(is_image(ball.from(h), ball.to(image)));
+        }
+        let never = shape.likeness(&shape, true, |_, _| false, &Progress::new()).expect("not cancelled");
+        assert!(never.is_none());
     }
 
     #[test]

@@ -1,11 +1,31 @@
 //! A mirror plane of a mesh, across which its polygons are mirror images, too.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
-use super::index::{FaceId, HalfedgeId};
+use super::index::{FaceId, HalfedgeId, VertexId};
 use super::likeness::{Likeness, Shape};
 use super::tri_mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
+
+/// A plane that mirrors.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plane {
+    point: Point3<f64>,
+    normal: Vector3<f64>,
+}
+
+impl Plane {
+    /// The one in which two points mirror each other; `None` where they are one.
+    fn between(p: Point3<f64>, q: Point3<f64>) -> Option<Self> {
+        let normal = (q - p).try_normalize(f64::MIN_POSITIVE)?;
+        Some(Self { point: nalgebra::center(&p, &q), normal })
+    }
+
+    /// The mirror image of a point.
+    pub(crate) fn mirrored(&self, p: Point3<f64>) -> Point3<f64> {
+        p - self.normal * (2.0 * self.normal.dot(&(p - self.point)))
+    }
+}
 
 /// The two halves of a mesh, each the mirror image of the other, with lines of edges between them.
 #[derive(Clone, Debug)]
@@ -20,6 +40,16 @@ impl Mirror {
     /// The faces of the half that has the first face of the mesh, ascending.
     pub(crate) fn first_half(&self) -> Vec<FaceId> {
         (0..self.in_first.len()).filter(|&f| self.in_first[f]).map(FaceId::new).collect()
+    }
+
+    /// The mirror plane, where the vertices of the mesh are at these positions.
+    pub(crate) fn plane(&self, mesh: &TriMesh, positions: &[Point3<f64>]) -> Option<Plane> {
+        let at = |v: VertexId| positions[v.index()];
+        let pair = |h: HalfedgeId| {
+            let image = self.likeness.image(h);
+            (!image.is_none()).then(|| (at(mesh.from(h)), at(mesh.to(image))))
+        };
+        farthest_apart(mesh.halfedges().filter_map(pair))
     }
 
     /// Whether an edge lies in the mirror plane, where the two halves meet.
@@ -76,20 +106,23 @@ fn is_reflection(shape: &Shape<'_>, image: &[HalfedgeId]) -> bool {
     let mesh = shape.mesh;
     let pairs = || {
         let sides = mesh.halfedges().filter(|h| !image[h.index()].is_none());
-        sides.map(|h| [mesh.from(h), mesh.to(image[h.index()])].map(|v| mesh.position(v)))
+        sides.map(|h| (mesh.position(mesh.from(h)), mesh.position(mesh.to(image[h.index()]))))
     };
-    let farthest = pairs().max_by(|[p, q], [r, s]| (p - q).norm_squared().total_cmp(&(r - s).norm_squared()));
-    let Some([p, q]) = farthest else { return false };
-    let Some(normal) = (q - p).try_normalize(f64::MIN_POSITIVE) else { return false };
-    let middle = nalgebra::center(&p, &q);
-    let mirrored = |p: Point3<f64>| p - normal * (2.0 * normal.dot(&(p - middle)));
-    pairs().all(|[p, q]| (mirrored(p) - q).norm() <= shape.tolerance)
+    let plane = farthest_apart(pairs());
+    plane.is_some_and(|plane| pairs().all(|(p, q)| (plane.mirrored(p) - q).norm() <= shape.tolerance))
+}
+
+/// The plane between those two points of some pairs that are farthest apart.
+fn farthest_apart(pairs: impl Iterator<Item = (Point3<f64>, Point3<f64>)>) -> Option<Plane> {
+    let apart = |pair: &(Point3<f64>, Point3<f64>)| (pair.0 - pair.1).norm_squared();
+    let (p, q) = pairs.max_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+    Plane::between(p, q)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{VertexId, test_surfaces};
+    use crate::mesh::test_surfaces;
 
     fn found(mesh: &TriMesh, polygon: &[u32]) -> Option<Mirror> {
         mirror(mesh, polygon, &Progress::new()).expect("not cancelled")
@@ -110,6 +143,8 @@ mod tests {
         // Even and odd across, but for x = 4 nothing is mirrored.
         let (mesh, polygon) = sheet(8, |x, y| (x - 4.0).powi(2) * 0.1 + 0.3 * y + 0.05 * y * y);
         let mirror = found(&mesh, &polygon).expect("a plane at x = 4");
+        let plane = mirror.plane(&mesh, mesh.positions()).expect("a plane");
+        assert!((plane.mirrored(Point3::new(1.0, 2.0, 3.0)) - Point3::new(7.0, 2.0, 3.0)).norm() < 1e-9);
         let half = mirror.first_half();
         assert_eq!(2 * half.len(), mesh.face_count());
         let on_plane = |v: VertexId| mesh.position(v).x == 4.0;

@@ -34,6 +34,6 @@ pub(crate) use groups::Groups;
 pub(crate) use index::{FaceId, HalfedgeId, VertexId};
 pub use input::{MeshError, MeshInput};
 pub(crate) use likeness::{Likeness, Shape};
-pub(crate) use mirror::{Mirror, mirror};
+pub(crate) use mirror::{Mirror, Plane, mirror};
 pub(crate) use quad::{Quad, is_convex};
 pub(crate) use tri_mesh::{Topology, TriMesh};

@@ -44,9 +44,13 @@ impl Prepared {
     ) -> Result<Atlas, UnwrapError> {
         needs::require(input, self.components.len(), settings)?;
         run.progress.enter(Stage::Charts);
-        let visibility = self.visibility(input, settings, run)?;
+        let Surface { vertex, scale, .. } = &self.surface;
+        // The mesh has each piece in a place of its own.
+        let positions: Vec<Point3<f64>> =
+            vertex.iter().map(|&v| input.positions[v as usize].map(|x| x / scale).into()).collect();
+        let visibility = self.visibility(&positions, settings, run)?;
         let visibility = visibility.as_deref().map(Vec::as_slice);
-        let (charts, rungs) = cutting::cut(&self.surface, &self.components, visibility, settings, run)?;
+        let (charts, rungs) = cutting::cut(&self.surface, &self.components, &positions, visibility, settings, run)?;
         clock.lap("charts");
         layout::lay_out(input, &self.surface, charts, rungs, settings, clock, run)
     }
@@ -54,24 +58,23 @@ impl Prepared {
     /// How far each vertex of the surface can be seen, where seams are to be hidden.
     fn visibility(
         &self,
-        input: &MeshInput<'_>,
+        positions: &[Point3<f64>],
         settings: &Settings,
         run: &Run<'_>,
     ) -> Result<Option<Arc<Vec<f32>>>, Cancelled> {
         if settings.hide_seams <= 0.0 {
             return Ok(None);
         }
-        let Surface { mesh, vertex, .. } = &self.surface;
-        let positions: Vec<Point3<f64>> = vertex.iter().map(|&v| input.positions[v as usize].into()).collect();
+        let mesh = &self.surface.mesh;
         let key = |f: &mut Fingerprint| {
             f.mesh(mesh);
             f.reals(positions.iter().flat_map(|p| [p.x, p.y, p.z]));
         };
         let bytes = |values: &Vec<f32>| 4 * values.len();
-        let compute = || visibility::of_vertices(mesh, &positions, run.progress);
+        let compute = || visibility::of_vertices(mesh, positions, run.progress);
         let visibility = run.recall(Kind::Visibility, key, bytes, compute)?;
         Ok(Some(match settings.front.direction() {
-            Some(front) => Arc::new(visibility::from_the_front(mesh, &positions, front.into(), &visibility)),
+            Some(front) => Arc::new(visibility::from_the_front(mesh, positions, front.into(), &visibility)),
             None => visibility,
         }))
     }
