@@ -55,22 +55,43 @@ fn horned() -> PolyMesh {
 #[test]
 fn mirrored_surfaces_have_mirrored_seams() {
     let mesh = horned();
-    let mirrored: BTreeMap<u32, u32> = {
-        let place = |p: [f64; 3]| p.map(|x| (x * 1e6).round() as i64);
-        let at: BTreeMap<[i64; 3], u32> = mesh.positions.iter().zip(0..).map(|(p, v)| (place(*p), v)).collect();
-        let image = |p: &[f64; 3]| at[&place([-p[0], p[1], p[2]])];
-        mesh.positions.iter().zip(0..).map(|(p, v)| (v, image(p))).collect()
-    };
     let share = |symmetry: Symmetry| {
         let atlas = unwrapped(&mesh, &Settings { symmetry, ..Settings::default() });
         assert_eq!(count(&atlas, "mirrored"), usize::from(symmetry == Symmetry::Auto));
-        let seams = seams(&mesh, &atlas);
-        let image = |[a, b]: &[u32; 2]| [mirrored[a].min(mirrored[b]), mirrored[a].max(mirrored[b])];
-        let kept = seams.iter().filter(|edge| seams.contains(&image(edge))).count();
-        kept as f64 / seams.len() as f64
+        mirrored_share(&mesh, &atlas)
     };
     assert_eq!(share(Symmetry::Auto), 1.0);
     assert!(share(Symmetry::Off) < 0.9, "else the shape is too easy for this test");
+}
+
+/// How many of the seams have a mirror image in x = 0 that is one, too.
+fn mirrored_share(mesh: &PolyMesh, atlas: &Atlas) -> f64 {
+    let place = |p: [f64; 3]| p.map(|x| (x * 1e6).round() as i64);
+    let at: BTreeMap<[i64; 3], u32> = mesh.positions.iter().zip(0..).map(|(p, v)| (place(*p), v)).collect();
+    let mirrored = |v: u32| {
+        let [x, y, z] = mesh.positions[v as usize];
+        at[&place([-x, y, z])]
+    };
+    let seams = seams(mesh, atlas);
+    let image = |&[a, b]: &[u32; 2]| [mirrored(a).min(mirrored(b)), mirrored(a).max(mirrored(b))];
+    seams.iter().filter(|edge| seams.contains(&image(edge))).count() as f64 / seams.len() as f64
+}
+
+/// Buttons on both sides of a body look the same from many sides, and are all alike.
+#[test]
+fn left_and_right_parts_are_mirror_images() {
+    let mut all = horned();
+    for k in 0..4 {
+        let (s, c) = (0.3 + 0.9 * f64::from(k)).sin_cos();
+        let right = capped_cylinder(0.4, 12, 3)
+            .moved(|[x, y, z]| [0.2 * x + 3.0, 0.2 * (c * y - s * z) + s, 0.2 * (s * y + c * z) + c]);
+        let mut left = right.clone().moved(|[x, y, z]| [-x, y, z]);
+        left.faces.iter_mut().for_each(|face| face.reverse());
+        all = all.joined(&right).joined(&left);
+    }
+    let atlas = unwrapped(&all, &Settings::default());
+    assert_eq!(count(&atlas, "copied"), 7);
+    assert_eq!(mirrored_share(&all, &atlas), 1.0);
 }
 
 #[test]

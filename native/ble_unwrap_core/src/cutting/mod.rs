@@ -43,7 +43,7 @@ use crate::settings::{ChartScale, LimitOver, Moves, Settings};
 use atlas_limit::join_within_atlas;
 use charted::Charted;
 use moves::across::cut_across;
-use twins::{Placed, twins};
+use twins::{Placed, Twin, twins};
 
 pub(crate) use cost::Price;
 pub(crate) use divide::divide;
@@ -97,18 +97,25 @@ pub(crate) fn cut(
     for (component, found) in in_parallel(originals, &of_component)? {
         made[component] = Some(found);
     }
-    let copied = in_parallel(copies, &|component| {
-        run.progress.check()?;
-        let original = twins[component].as_ref().and_then(|twin| Some((twin, made[twin.original].as_ref()?)));
-        let Some((twin, charts)) = original else { return of_component(component) };
-        let [there, here] = [twin.original, component].map(|c| (patch_of(c), components.group(c)));
-        let copied = twin.charts((&there.0, there.1), &charts.0, (&here.0, here.1), settings, run)?;
-        let Some(copied) = copied else { return of_component(component) };
-        charted.add(components.group(component).len() as f64, 1.0);
-        Ok(Arc::new(copied))
-    })?;
-    for (component, found) in copied {
-        made[component] = Some(found);
+    // A copy may be the original of its mirror image: round by round, and each round makes some.
+    let mut open = copies;
+    while !open.is_empty() {
+        let is_made = |twin: &Option<Twin>| twin.as_ref().is_none_or(|twin| made[twin.original].is_some());
+        let (ready, later): (Vec<usize>, Vec<usize>) = open.into_iter().partition(|&c| is_made(&twins[c]));
+        let copied = in_parallel(ready, &|component| {
+            run.progress.check()?;
+            let original = twins[component].as_ref().and_then(|twin| Some((twin, made[twin.original].as_ref()?)));
+            let Some((twin, charts)) = original else { return of_component(component) };
+            let [there, here] = [twin.original, component].map(|c| (patch_of(c), components.group(c)));
+            let copied = twin.charts((&there.0, there.1), &charts.0, (&here.0, here.1), settings, run)?;
+            let Some(copied) = copied else { return of_component(component) };
+            charted.add(components.group(component).len() as f64, 1.0);
+            Ok(Arc::new(copied))
+        })?;
+        for (component, found) in copied {
+            made[component] = Some(found);
+        }
+        open = later;
     }
     let (mut charts, mut rungs) = (Vec::new(), Rungs::default());
     for component in made.into_iter().flatten() {

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::HashMap;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::cache::Run;
@@ -28,7 +28,7 @@ const MISPLACED: f64 = 0.1;
 
 /// A component that is like another one.
 pub(super) struct Twin {
-    /// The other, which is like none before it.
+    /// The other: like none before it, or itself a twin whose mirror image this one is.
     pub(super) original: usize,
     /// Of the original to this one.
     likeness: Likeness,
@@ -101,15 +101,27 @@ fn twins_among(
     progress: &Progress,
 ) -> Result<Vec<(usize, Twin)>, Cancelled> {
     let mut originals: Vec<(usize, Placed)> = Vec::new();
+    let mut middles: Vec<(usize, Point3<f64>)> = Vec::new();
     let mut twins = Vec::new();
     for &component in group {
         let own = placed(component);
         let mut found = None;
+        if let Some(plane) = plane {
+            let middle = own.middle();
+            let image = plane.mirrored(middle);
+            let most = MISPLACED * own.extent();
+            let partner = middles.iter().find(|other| (other.1 - image).norm() <= most);
+            if let Some(&(original, _)) = partner {
+                let likeness = likeness_in(plane, &placed(original), &own, progress)?;
+                found = likeness.map(|likeness| Twin { original, likeness });
+            }
+            middles.push((component, middle));
+        }
         for (original, other) in &originals {
-            found = likeness(other, &own, plane, progress)?.map(|likeness| Twin { original: *original, likeness });
             if found.is_some() {
                 break;
             }
+            found = likeness(other, &own, progress)?.map(|likeness| Twin { original: *original, likeness });
         }
         match found {
             Some(twin) => twins.push((component, twin)),
@@ -120,25 +132,26 @@ fn twins_among(
     Ok(twins)
 }
 
-/// The likeness of one component to another: in the mirror plane if there is one, else any.
-fn likeness(
+/// The likeness of a component to another that is its mirror image in a plane, where both are.
+fn likeness_in(
+    plane: &Plane,
     here: &Placed,
     there: &Placed,
-    plane: Option<&Plane>,
     progress: &Progress,
 ) -> Result<Option<Likeness>, Cancelled> {
-    let [a, b] = [here, there].map(|placed| Shape::new(&placed.patch.mesh, &placed.patch.polygon));
-    let (Some(a), Some(b)) = (a, b) else { return Ok(None) };
-    if let Some(plane) = plane {
-        let most = MISPLACED * a.extent();
-        let is_image = |v: VertexId, w: VertexId| {
-            (plane.mirrored(here.positions[v.index()]) - there.positions[w.index()]).norm() <= most
-        };
-        let found = a.likeness(&b, true, is_image, progress)?;
-        if found.is_some() {
-            return Ok(found);
-        }
+    let most = MISPLACED * here.extent();
+    let is_image = |v: VertexId, w: VertexId| {
+        (plane.mirrored(here.positions[v.index()]) - there.positions[w.index()]).norm() <= most
+    };
+    match (here.shape(), there.shape()) {
+        (Some(a), Some(b)) => a.likeness(&b, true, is_image, progress),
+        _ => Ok(None),
     }
+}
+
+/// The likeness of one component to another, wherever both are.
+fn likeness(here: &Placed, there: &Placed, progress: &Progress) -> Result<Option<Likeness>, Cancelled> {
+    let (Some(a), Some(b)) = (here.shape(), there.shape()) else { return Ok(None) };
     for is_mirrored in [true, false] {
         let found = a.likeness(&b, is_mirrored, |_, _| true, progress)?;
         if found.is_some() {
@@ -146,6 +159,24 @@ fn likeness(
         }
     }
     Ok(None)
+}
+
+impl Placed {
+    fn shape(&self) -> Option<Shape<'_>> {
+        Shape::new(&self.patch.mesh, &self.patch.polygon)
+    }
+
+    /// The mean of its vertices.
+    fn middle(&self) -> Point3<f64> {
+        let sum = self.positions.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords);
+        Point3::from(sum / self.positions.len().max(1) as f64)
+    }
+
+    /// The distance of its farthest vertex from there.
+    fn extent(&self) -> f64 {
+        let middle = self.middle();
+        self.positions.iter().map(|p| (p - middle).norm()).fold(0.0, f64::max)
+    }
 }
 
 impl Twin {

@@ -66,11 +66,6 @@ impl<'a> Shape<'a> {
         Some(shape)
     }
 
-    /// The distance of the farthest vertex from the middle.
-    pub(crate) fn extent(&self) -> f64 {
-        self.radius.iter().copied().fold(0.0, f64::max)
-    }
-
     pub(super) fn is_diagonal(&self, h: HalfedgeId) -> bool {
         let t = self.mesh.twin(h);
         !t.is_none() && self.polygon[t.face().index()] == self.polygon[h.face().index()]
