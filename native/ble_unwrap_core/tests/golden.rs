@@ -43,7 +43,7 @@ static ROWS: [Row; 17] = [
     row("hemisphere", [1, 1], 1.0211, 0.0, 0.782),
     row("icosphere", [1, 1], 1.0084, 2.092, 0.462),
     row("open cylinder", [1, 1], 1.0, 0.691, 0.476),
-    row("capped cylinder", [1, 1], 1.0010, 2.971, 0.418),
+    row("capped cylinder", [1, 1], 1.0003, 3.084, 0.409),
     row("cone", [1, 1], 1.0, 0.85, 0.54),
     row("torus", [1, 1], 1.0297, 1.692, 0.289),
     row("plate with five holes", [6, 6], 1.0, 6.083, 0.672),

@@ -23,6 +23,8 @@ pub(super) const CHART: f64 = 1.5;
 /// A chart of at most this L2 stretch is unrolled: half a degree between the normals of two faces gives 1.0001, and nobody sees a
 /// tenth of a per cent.
 const UNROLLED: f64 = 1.001;
+/// A chart of at most this stretch is as flat as its faces' rounding and half a degree between them leave it.
+const EXACT: f64 = 1.0001;
 
 /// A seam that nobody can see counts for this share of its length: no seam is for nothing.
 const LEAST_DISLIKE: f64 = 0.1;
@@ -135,7 +137,9 @@ impl Price {
             return settings.stretch_limit;
         }
         if !self.may_bend && old.iter().all(|chart| unrolls(chart)) {
-            return settings.stretch_limit.min(UNROLLED);
+            // For one chart fewer a tenth of a per cent may do; to close the end of a cut is no reason to bend at all.
+            let most = if let [chart] = old { chart.l2.max(EXACT) } else { UNROLLED };
+            return settings.stretch_limit.min(most);
         }
         let share = old.iter().map(|chart| chart.patch.area()).sum::<f64>() / self.area;
         let saved = CHART * (old.len() as f64 - 1.0) + self.of_seam(glued);
@@ -288,7 +292,8 @@ mod tests {
         assert!(price(&mesh, 1e-3).is_worth(&old, &one));
         assert!(price(&mesh, 1e-3).bending().is_worth(&old, &bent));
         let settings = Settings::default();
-        assert!(price(&mesh, 20.0).limit_of_union(&old, 4.0, &settings) <= UNROLLED);
+        assert_eq!(price(&mesh, 20.0).limit_of_union(&old, 4.0, &settings), UNROLLED);
+        assert_eq!(price(&mesh, 20.0).limit_of_union(&old[..1], 4.0, &settings), EXACT, "a cut closed");
         assert!(price(&mesh, 20.0).bending().limit_of_union(&old, 4.0, &settings) > 1.05);
     }
 
