@@ -25,6 +25,8 @@ const SAMPLES: usize = 1500;
 /// A ray begins so far above its vertex, as a share of the diagonal of the model's box: far enough to leave the faces there, near enough to
 /// see any wrinkle that matters.
 const ABOVE: f64 = 1e-4;
+/// Triangles in one tree of boxes, which takes a thread some 30 ms to make.
+const TREE: usize = 1 << 15;
 /// Samples traced by one thread between two looks at whether the caller has cancelled.
 const TOGETHER: usize = 64;
 
@@ -84,9 +86,8 @@ struct Scene<'a> {
     mesh: &'a TriMesh,
     /// The vertices in the unit box.
     positions: Vec<Point3<f64>>,
-    tree: Bvh2,
-    /// In the order of the tree.
-    triangles: Vec<Triangle>,
+    /// Of the triangles some thousands at a time.
+    trees: Vec<Tree>,
     /// Directions in the hemisphere over the xy plane.
     directions: Vec<Vector3<f64>>,
 }
@@ -106,13 +107,13 @@ impl<'a> Scene<'a> {
         let positions: Vec<_> = positions.iter().map(|p| Point3::from((p.coords - middle) / diagonal)).collect();
         let at = |v: VertexId| single(positions[v.index()].coords);
         let triangle = |t: &[VertexId; 3]| Triangle { v0: at(t[0]), v1: at(t[1]), v2: at(t[2]) };
-        let unordered: Vec<Triangle> = mesh.triangles().iter().map(triangle).collect();
-        progress.check()?;
-        let mut build_time = Duration::ZERO;
-        let tree = build_bvh2(&unordered, BvhBuildParams::very_fast_build(), &mut build_time);
-        progress.check()?;
-        let triangles = tree.primitive_indices.iter().map(|&i| unordered[i as usize]).collect();
-        Ok(Some(Self { mesh, positions, tree, triangles, directions: hemisphere(RAYS) }))
+        let some = |triangles: &[[VertexId; 3]]| {
+            progress.check()?;
+            Ok(Tree::new(triangles.iter().map(triangle).collect()))
+        };
+        let trees: Vec<Result<Tree, Cancelled>> = mesh.triangles().par_chunks(TREE).map(some).collect();
+        let trees = trees.into_iter().collect::<Result<Vec<_>, Cancelled>>()?;
+        Ok(Some(Self { mesh, positions, trees, directions: hemisphere(RAYS) }))
     }
 
     fn visibility(&self, v: VertexId) -> f32 {
@@ -121,7 +122,7 @@ impl<'a> Scene<'a> {
         let origin = single(self.positions[v.index()].coords + ABOVE * normal);
         let leaves = |d: &&Vector3<f64>| {
             let ray = Ray::new_inf(origin, single(along * d.x + across * d.y + normal * d.z));
-            self.tree.ray_traverse_miss(ray, |ray, i| self.triangles[i].intersect(ray))
+            self.trees.iter().all(|tree| tree.is_missed(ray))
         };
         self.directions.iter().filter(leaves).count() as f32 / self.directions.len() as f32
     }
@@ -133,6 +134,26 @@ impl<'a> Scene<'a> {
         let side = at(self.mesh.to(self.mesh.an_outgoing(v))) - at(v);
         let along = (side - normal * normal.dot(&side)).try_normalize(f64::MIN_POSITIVE)?;
         Some((normal, along))
+    }
+}
+
+/// Some triangles, so few that a cancel is not kept waiting while their boxes are made.
+struct Tree {
+    boxes: Bvh2,
+    /// In the order of the boxes.
+    triangles: Vec<Triangle>,
+}
+
+impl Tree {
+    fn new(triangles: Vec<Triangle>) -> Self {
+        let mut build_time = Duration::ZERO;
+        let boxes = build_bvh2(&triangles, BvhBuildParams::very_fast_build(), &mut build_time);
+        let triangles = boxes.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
+        Self { boxes, triangles }
+    }
+
+    fn is_missed(&self, ray: Ray) -> bool {
+        self.boxes.ray_traverse_miss(ray, |ray, i| self.triangles[i].intersect(ray))
     }
 }
 
