@@ -144,6 +144,8 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     # In Blender figures look along -Y.
     front: declared("front", default="-Y")
     symmetry: declared("symmetry")
+    style: declared("style")
+    straighten: declared("straighten", soft_max=1.0, step=5, precision=2)
     moves: declared("moves")
     holes: declared("holes")
     chart_scale: declared("chart_scale")
@@ -193,7 +195,10 @@ ADVANCED_SETTINGS = (
     ("Result", ("uv_map", "uv_map_name", "correct_aspect", "use_original_bounds", "move_pinned", "mark_seams")),
     (
         "Borders",
-        ("follow_seams", "follow_sharp", "follow_materials", "crease_weight", "hide_seams", "front", "symmetry"),
+        (
+            *("follow_seams", "follow_sharp", "follow_materials", "crease_weight"),
+            *("hide_seams", "front", "symmetry", "style", "straighten"),
+        ),
     ),
     (
         "Charts",

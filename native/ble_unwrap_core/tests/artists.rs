@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use ble_unwrap_core::settings::{Front, Settings, Symmetry};
+use ble_unwrap_core::settings::{Front, Settings, Style, Symmetry};
 use ble_unwrap_core::{Atlas, MeshInput, Progress, unwrap};
-use ble_unwrap_fixtures::{PolyMesh, capped_cylinder, torus, uv_sphere, voxels};
+use ble_unwrap_fixtures::{PolyMesh, capped_cylinder, torus, uv_sphere, voxels, wrapped_grid};
 
 fn unwrapped(mesh: &PolyMesh, settings: &Settings) -> Atlas {
     let flat = mesh.flat();
@@ -218,4 +218,120 @@ fn straight_borders_lie_along_the_axes() {
     let cube = turned(voxels([6, 6, 6], |_| true));
     let atlas = unwrapped(&cube, &Settings::default());
     assert!(aligned_share(&cube, &atlas) > 0.999 && atlas.report.l2 < 1.0001, "{}", aligned_share(&cube, &atlas));
+}
+
+/// A body of revolution: a profile of (radius, height) around z, closed by a cap of one polygon at each end.
+fn lathe(sides: usize, profile: &[[f64; 2]]) -> PolyMesh {
+    let rows = profile.len() - 1;
+    let mut mesh = wrapped_grid(sides, rows, [true, false], |u, v| {
+        let [r, z] = profile[(v * rows as f64).round() as usize];
+        let (s, c) = (std::f64::consts::TAU * u).sin_cos();
+        [r * c, r * s, z]
+    });
+    let ring = |row: usize| (0..sides).map(move |k| (row * sides + k) as u32);
+    mesh.faces.push(ring(0).rev().collect());
+    mesh.faces.push(ring(rows).collect());
+    mesh
+}
+
+/// A gear: teeth between two flat rings, and a round hole.
+fn gear(teeth: usize) -> PolyMesh {
+    let steps = [(0.0, 1.0), (0.15, 1.25), (0.35, 1.25), (0.5, 1.0)];
+    let n = 4 * teeth;
+    let corner = |k: usize, inner: bool| {
+        let (along, radius) = steps[k % 4];
+        let (angle, radius) =
+            if inner { (k as f64 / n as f64, 0.4) } else { (((k / 4) as f64 + along) / teeth as f64, radius) };
+        let (s, c) = (std::f64::consts::TAU * angle).sin_cos();
+        [radius * c, radius * s]
+    };
+    let mut mesh = PolyMesh::default();
+    for (inner, z) in [(false, 0.0), (false, 0.4), (true, 0.0), (true, 0.4)] {
+        mesh.positions.extend((0..n).map(|k| corner(k, inner)).map(|[x, y]| [x, y, z]));
+    }
+    for k in 0..n {
+        let [a, b] = [k, (k + 1) % n].map(|k| k as u32);
+        let m = n as u32;
+        mesh.faces.push(vec![a, b, m + b, m + a]);
+        mesh.faces.push(vec![2 * m + b, 2 * m + a, 3 * m + a, 3 * m + b]);
+        mesh.faces.push(vec![b, a, 2 * m + a, 2 * m + b]);
+        mesh.faces.push(vec![m + a, m + b, 3 * m + b, 3 * m + a]);
+    }
+    mesh
+}
+
+/// Turned and moved, in quads and in triangles.
+fn in_all_ways(mesh: &PolyMesh) -> Vec<PolyMesh> {
+    let turned = mesh.clone().moved(|[x, y, z]| {
+        let (s, c) = 0.7_f64.sin_cos();
+        [c * x - s * z + 3.0, y - 1.0, s * x + c * z]
+    });
+    [mesh.clone(), turned].into_iter().flat_map(|mesh| [mesh.clone().triangulated(), mesh]).collect()
+}
+
+#[test]
+fn a_barrel_is_a_rectangle_and_two_round_caps() {
+    for (sides, bulge) in [(12, 0.25), (24, 0.25), (24, 0.1)] {
+        let profile: Vec<[f64; 2]> =
+            (-4..=4).map(|k| 0.25 * f64::from(k)).map(|t| [1.0 - bulge * t * t, 1.25 * t]).collect();
+        for mesh in in_all_ways(&lathe(sides, &profile)) {
+            let atlas = unwrapped(&mesh, &Settings::default());
+            assert!([1, 3].contains(&atlas.report.charts), "the caps are apart, or hang on by an edge");
+            assert!(atlas.report.l2 < 1.006, "{}", atlas.report.l2);
+            // Two of the wall's sides are as long as the caps are round, twice in all: once on the wall, once on the cap.
+            assert!(aligned_share(&mesh, &atlas) > 0.6, "{}", aligned_share(&mesh, &atlas));
+            let left = unwrapped(&mesh, &Settings { straighten: 0.0, ..Settings::default() });
+            assert!(left.report.l2 < atlas.report.l2 && aligned_share(&mesh, &left) < 0.5);
+        }
+    }
+}
+
+#[test]
+fn a_machined_part_is_cut_at_its_hard_edges_and_nowhere_else() {
+    for mesh in in_all_ways(&gear(12)) {
+        let atlas = unwrapped(&mesh, &Settings::default());
+        assert!(atlas.report.l2 < 1.0001, "{}", atlas.report.l2);
+        assert!(atlas.report.charts <= 7, "two rings, the hole, and strips of teeth: {}", atlas.report.charts);
+        // All of both rings' edges, and some across the strips.
+        assert!(seams(&mesh, &atlas).len() < 4 * 48 + 12);
+        let organic = unwrapped(&mesh, &Settings { style: Style::Organic, ..Settings::default() });
+        assert!(organic.report.l2 > 1.01, "as a grown thing it is bent: {}", organic.report.l2);
+    }
+}
+
+#[test]
+fn a_bevelled_box_keeps_its_flats_where_it_is_known_to_be_manufactured() {
+    // An octagon, high: its walls are 45 degrees apart, which is round unless one says that it is not.
+    let mesh = lathe(8, &[[0.8, 0.0], [1.0, 0.2], [1.0, 2.0], [0.8, 2.2]]);
+    let hard = unwrapped(&mesh, &Settings { style: Style::Hard, ..Settings::default() });
+    let auto = unwrapped(&mesh, &Settings::default());
+    assert!(hard.report.l2 < 1.001 && hard.report.l2 < auto.report.l2, "{} {}", hard.report.l2, auto.report.l2);
+}
+
+#[test]
+fn a_pipe_bend_is_one_rectangle() {
+    let pipe = wrapped_grid(12, 16, [true, false], |u, v| {
+        let ((s, c), (t, d)) = ((std::f64::consts::TAU * u).sin_cos(), (0.5 * std::f64::consts::PI * v).sin_cos());
+        let r = 4.0 + 0.5 * c;
+        [r * d, r * t, 0.5 * s]
+    });
+    for mesh in in_all_ways(&pipe) {
+        let atlas = unwrapped(&mesh, &Settings::default());
+        assert!(atlas.report.charts == 1 && atlas.report.l2 < 1.007, "{}", atlas.report.l2);
+        assert!(aligned_share(&mesh, &atlas) > 0.999, "{}", aligned_share(&mesh, &atlas));
+        let low = |k: usize| atlas.uv.iter().map(|p| p[k]).fold(f32::INFINITY, f32::min);
+        let high = |k: usize| atlas.uv.iter().map(|p| p[k]).fold(0.0, f32::max);
+        let whole = f64::from((high(0) - low(0)) * (high(1) - low(1)));
+        assert!(atlas.report.packing_efficiency > 0.98 * whole, "it fills its box");
+    }
+}
+
+#[test]
+fn the_net_of_a_box_runs_along_its_edges_and_not_across_its_sides() {
+    for size in [[1, 2, 3], [1, 1, 6], [2, 2, 2]] {
+        let mesh = voxels(size, |_| true).triangulated();
+        let atlas = unwrapped(&mesh, &Settings::default());
+        assert!(atlas.report.l2 < 1.0001);
+        assert!(aligned_share(&mesh, &atlas) > 0.999, "{size:?}: {}", aligned_share(&mesh, &atlas));
+    }
 }

@@ -111,7 +111,9 @@ fn cancelled_before_the_start_and_after_the_end() {
 
 #[test]
 fn progress_only_rises_and_ends_at_one() {
-    let mesh = sculpt_like(6000);
+    // Each of them is charted by itself.
+    let apart = |faces: usize, x: f64| sculpt_like(faces).moved(|[u, v, w]| [u + x, v, w]);
+    let mesh = apart(6000, 0.0).joined(&apart(4000, 9.0)).joined(&apart(3000, 18.0)).joined(&apart(2000, 27.0));
     let flat = mesh.flat();
     let progress = Progress::new();
     let mut seen = vec![(progress.stage(), progress.fraction())];

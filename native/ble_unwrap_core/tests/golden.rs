@@ -35,22 +35,22 @@ const EFFICIENCY: f64 = 0.04;
 
 static ROWS: [Row; 17] = [
     row("flat grid", [1, 1], 1.0, 0.0, 0.996),
-    row("bumpy grid", [1, 1], 1.0075, 0.0, 0.750),
+    row("bumpy grid", [1, 1], 1.0112, 0.0, 0.841),
     row("disc", [1, 1], 1.0, 0.0, 0.783),
     row("L shape", [1, 1], 1.0, 0.0, 0.747),
     row("annulus", [1, 1], 1.0, 0.0, 0.658),
     row("cap of 40 degrees", [1, 1], 1.0008, 0.0, 0.782),
     row("hemisphere", [1, 1], 1.0211, 0.0, 0.782),
-    row("icosphere", [1, 1], 1.0084, 2.092, 0.462),
+    row("icosphere", [1, 1], 1.0151, 2.092, 0.425),
     row("open cylinder", [1, 1], 1.0, 0.691, 0.476),
-    row("capped cylinder", [1, 1], 1.0003, 3.084, 0.409),
+    row("capped cylinder", [3, 3], 1.0, 3.355, 0.475),
     row("cone", [1, 1], 1.0, 0.85, 0.54),
     row("torus", [1, 1], 1.0297, 1.692, 0.289),
-    row("plate with five holes", [6, 6], 1.0, 6.083, 0.672),
+    row("plate with five holes", [7, 7], 1.0, 7.138, 0.523),
     row("Moebius strip", [2, 2], 1.0, 0.617, 0.548),
     row("Klein bottle", [1, 1], 1.0251, 2.011, 0.571),
-    row("face", [1, 1], 1.0060, 0.629, 0.577),
-    row("small sculpt", [1, 1], 1.0225, 3.924, 0.477),
+    row("face", [1, 1], 1.0063, 0.777, 0.570),
+    row("small sculpt", [2, 2], 1.0211, 4.389, 0.491),
 ];
 
 #[test]

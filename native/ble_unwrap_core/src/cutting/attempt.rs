@@ -101,10 +101,11 @@ impl<'a> Attempt<'a> {
         if let Some(chart) = self.without_stretch(rungs) {
             return Ok(Some(chart));
         }
+        // What unrolls in parts is not bent.
+        if !cost::may_bend(self.settings.stretch_price) && split::hard_parts(patch).is_some() {
+            return Ok(None);
+        }
         if may_be_chart || is_closed {
-            if !cost::may_bend(self.settings.stretch_price) && split::unrolling_parts(patch, self.settings).is_some() {
-                return Ok(None);
-            }
             let chart = self.flat_or_darted(is_closed, rungs)?;
             if chart.is_some() || is_closed {
                 return Ok(chart);
@@ -114,7 +115,7 @@ impl<'a> Attempt<'a> {
             return Ok(None);
         }
         if self.topology.genus() > 0 && self.settings.holes == Holes::Keep {
-            let length = |h| patch.mesh.edge_length(h) * patch.mesh.border_cost(h);
+            let length = |h| cost::of_cut(&patch.mesh, h);
             let open = patch.cut(&charts::cut_open(&patch.mesh, length, |h| patch.is_diagonal(h)));
             let is_disk = open.mesh.topology().is_disk();
             let chart = self.run_cut(open, rungs)?;
@@ -165,7 +166,7 @@ impl<'a> Attempt<'a> {
 
     fn cut_to_disk(&self) -> Patch {
         let patch = self.patch();
-        let length = |h| patch.mesh.edge_length(h) * patch.mesh.border_cost(h);
+        let length = |h| cost::of_cut(&patch.mesh, h);
         patch.cut(&charts::cut_to_disk(&patch.mesh, length, |h| patch.is_diagonal(h)))
     }
 

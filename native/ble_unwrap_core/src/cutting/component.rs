@@ -8,6 +8,8 @@ use crate::progress::Cancelled;
 use crate::settings::Settings;
 
 use super::charted::Charted;
+use super::cost::{self, Price};
+use super::divide::{self, Charting};
 use super::level::OnCoarse;
 use super::moves::hand_over::hand_over;
 use super::moves::join::Which;
@@ -35,12 +37,10 @@ pub(crate) fn charts(
     let fine = Whole { patch: whole };
     let size = faces.len() as f64;
     let mut rungs = Rungs::default();
-    let is_large = whole.mesh.vertex_count() > COARSE_ABOVE && settings.coarse;
-    // What unrolls needs no trials that a coarse mesh would make cheap, and has its edges on the fine one.
-    let unrolling = split::unrolling_parts(whole, settings);
-    if unrolling.is_none()
-        && let Some(mirror) = symmetric::mirror(whole, is_large, settings, run)?
-    {
+    let is_large = is_large(whole, settings);
+    let parts = split::hard_parts(whole);
+    let all_unroll = parts.is_some() && whole.mesh.faces().all(|f| whole.mesh.part(f) != 0);
+    if !all_unroll && let Some(mirror) = symmetric::mirror(whole, is_large, settings, run)? {
         let of_half = |half: &Patch, faces: &[FaceId], once: &Settings| charts(half, faces, once, charted, run);
         if let Some((mut charts, rungs)) = symmetric::charts(whole, &mirror, is_large, settings, &of_half, run)? {
             charted.add(0.5 * size, 1.0);
@@ -48,7 +48,15 @@ pub(crate) fn charts(
             return Ok((charts, rungs));
         }
     }
-    let mut charts = if is_large && unrolling.is_none() {
+    // What unrolls needs no trials that a coarse mesh would make cheap, and has its edges on the fine one.
+    let parts = parts.filter(|_| is_large && (all_unroll || !cost::may_bend(settings.stretch_price)));
+    let mut charts = if let Some(parts) = parts {
+        let charting = by_parts(parts, whole, settings, charted, run)?;
+        rungs.add(&charting.rungs);
+        // A large union is as costly to embed whether or not its parts unroll.
+        let charts = fine.join(charting, Which::every_on_fine(FINE_UNION), settings, &mut rungs, run)?;
+        joined_and_closed(fine, charts, settings, &mut rungs, run)?
+    } else if is_large {
         let coarse = OnCoarse::new(fine, settings, run)?;
         let parts = coarse.parts(&mut rungs, run)?;
         charted.add(size, COARSE_WORK);
@@ -57,16 +65,53 @@ pub(crate) fn charts(
         fine.join(charting, Which::AfterSplits { most_faces: FINE_UNION }, settings, &mut rungs, run)?
     } else {
         // A small one is left to the search as it is: it may also unroll in fewer parts.
-        let patches = unrolling.filter(|_| is_large).unwrap_or_else(|| vec![whole.clone()]);
-        // A large union is as costly to embed whether or not its parts unroll.
-        let which = if is_large { Which::every_on_fine(FINE_UNION) } else { Which::EVERY };
-        let charts = fine.charts(patches, which, settings, &mut rungs, &|faces| charted.add(faces, 1.0), run)?;
-        let charts = fine.join_partly(charts, settings, &mut rungs, run)?;
-        fine.close(charts, settings, &mut rungs, run)?
+        let done = |faces| charted.add(faces, 1.0);
+        let charts = fine.charts(vec![whole.clone()], Which::EVERY, settings, &mut rungs, &done, run)?;
+        joined_and_closed(fine, charts, settings, &mut rungs, run)?
     };
     charts = hand_over(&whole.mesh, &whole.polygon, charts, settings, &mut rungs, run)?;
     rename(&mut charts, faces);
     Ok((charts, rungs))
+}
+
+/// Whether a component is charted on a coarse mesh, unless it comes apart into parts that unroll.
+fn is_large(whole: &Patch, settings: &Settings) -> bool {
+    whole.mesh.vertex_count() > COARSE_ABOVE && settings.coarse
+}
+
+/// The charts of the parts of a component: what does not unroll and is large is charted as a component is.
+fn by_parts(
+    parts: Vec<Patch>,
+    whole: &Patch,
+    settings: &Settings,
+    charted: &Charted<'_>,
+    run: &Run<'_>,
+) -> Result<Charting, Cancelled> {
+    let unrolls = |part: &Patch| part.mesh.faces().all(|f| part.mesh.part(f) != 0);
+    let (large, others): (Vec<Patch>, Vec<Patch>) =
+        parts.into_iter().partition(|part| !unrolls(part) && is_large(part, settings));
+    let price = Price::new(&whole.mesh, settings);
+    let mut charting = divide::divide(others, &price, settings, &|faces| charted.add(faces, 1.0), run)?;
+    for part in large {
+        let alone = Patch::whole(part.mesh, part.polygon);
+        let (more, rungs) = charts(&alone, &part.faces, settings, charted, run)?;
+        charting.rungs.add(&rungs);
+        charting.family.extend(more.iter().map(|_| None));
+        charting.charts.extend(more);
+    }
+    Ok(charting)
+}
+
+/// Charts joined along parts of their borders, and their cuts closed from their ends on.
+fn joined_and_closed(
+    fine: Whole<'_>,
+    charts: Vec<Chart>,
+    settings: &Settings,
+    rungs: &mut Rungs,
+    run: &Run<'_>,
+) -> Result<Vec<Chart>, Cancelled> {
+    let charts = fine.join_partly(charts, settings, rungs, run)?;
+    fine.close(charts, settings, rungs, run)
 }
 
 /// Names the faces of charts of a component as they are named on the surface.

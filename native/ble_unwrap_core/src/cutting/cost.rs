@@ -14,7 +14,7 @@
 use std::sync::Arc;
 
 use crate::charts::{Chart, Patch};
-use crate::mesh::{FaceId, Groups, TriMesh, VertexId, measure};
+use crate::mesh::{FaceId, Groups, HalfedgeId, TriMesh, VertexId, measure};
 use crate::settings::Settings;
 
 /// A chart costs as much as a seam of so many √A. It is the rate at which the search traded charts for seam when that was still spread
@@ -25,6 +25,12 @@ pub(super) const CHART: f64 = 1.5;
 const UNROLLED: f64 = 1.001;
 /// A chart of at most this stretch is as flat as its faces' rounding and half a degree between them leave it.
 const EXACT: f64 = 1.0001;
+
+/// To straighten the sides of what unrolls costs so many times the stretch: the wall of a cup, a little wider above than below, becomes a
+/// rectangle, and the fan of a cone stays as it is.
+const BENDING: f64 = 5.0;
+/// A minimum that was come to rest at may be lower by so much of L2 stretch.
+const AT_REST: f64 = 1e-3;
 
 /// A seam that nobody can see counts for this share of its length: no seam is for nothing.
 const LEAST_DISLIKE: f64 = 0.1;
@@ -86,17 +92,32 @@ pub(crate) struct Price {
     stretch: f64,
     /// Whether what unrolls may be bent where that is worth it.
     may_bend: bool,
+    /// The L2 stretch up to which a union of what unrolls does so, too.
+    unrolled: f64,
+    /// [`Settings::straighten`].
+    straight: f64,
 }
 
 impl Price {
     pub(crate) fn new(mesh: &TriMesh, settings: &Settings) -> Self {
+        Self::on_area(measure::total_area(mesh), settings)
+    }
+
+    /// The prices on a surface of some area.
+    pub(crate) fn on_area(area: f64, settings: &Settings) -> Self {
         let stretch = settings.stretch_price;
-        Self { area: measure::total_area(mesh).max(f64::MIN_POSITIVE), stretch, may_bend: may_bend(stretch) }
+        let area = area.max(f64::MIN_POSITIVE);
+        Self { area, stretch, may_bend: may_bend(stretch), unrolled: UNROLLED, straight: settings.straighten }
     }
 
     /// The same prices where what unrolls is worth no more than what does not: two halves that only their mirror plane keeps apart.
     pub(super) fn bending(self) -> Self {
         Self { may_bend: true, ..self }
+    }
+
+    /// The same prices where what unrolls stays as flat as it is: to hang on by a part of a border is no reason to bend at all.
+    pub(super) fn exact(self) -> Self {
+        Self { unrolled: EXACT, ..self }
     }
 
     /// What some length of seam costs.
@@ -109,9 +130,9 @@ impl Price {
         self.area * self.of_seam(length) / self.stretch
     }
 
-    /// What the stretch of a chart costs.
-    fn of_stretch(&self, chart: &Chart) -> f64 {
-        self.stretch * chart.patch.area() / self.area * (chart.l2 * chart.l2 - 1.0).max(0.0)
+    /// What it costs if the L2 stretch of a chart is so much.
+    fn of_stretch(&self, chart: &Chart, l2: f64) -> f64 {
+        self.stretch * chart.patch.area() / self.area * (l2 * l2 - 1.0).max(0.0)
     }
 
     /// What a chart costs.
@@ -119,7 +140,7 @@ impl Price {
         let mesh = &chart.patch.mesh;
         let border = mesh.halfedges().filter(|&h| mesh.is_boundary(h));
         let seam: f64 = border.map(|h| mesh.edge_length(h) * mesh.border_cost(h)).sum();
-        CHART + 0.5 * self.of_seam(seam) + self.of_stretch(chart)
+        CHART + 0.5 * self.of_seam(seam) + self.of_stretch(chart, chart.l2)
     }
 
     /// The stretch up to which a patch is made one chart. With more, a cut may be worth its seam, if it took all of the stretch away
@@ -136,21 +157,28 @@ impl Price {
         if may_bend(self.stretch) {
             return settings.stretch_limit;
         }
-        if !self.may_bend && old.iter().all(|chart| unrolls(chart)) {
+        if !self.may_bend && is_kept_unrolled(old) {
             // For one chart fewer a tenth of a per cent may do; to close the end of a cut is no reason to bend at all.
-            let most = if let [chart] = old { chart.l2.max(EXACT) } else { UNROLLED };
+            let most = if let [chart] = old { chart.l2.max(EXACT) } else { self.unrolled };
             return settings.stretch_limit.min(most);
         }
         let share = old.iter().map(|chart| chart.patch.area()).sum::<f64>() / self.area;
         let saved = CHART * (old.len() as f64 - 1.0) + self.of_seam(glued);
-        let stretch = saved + old.iter().map(|chart| self.of_stretch(chart)).sum::<f64>();
+        let stretch = saved + old.iter().map(|chart| self.of_stretch(chart, chart.l2)).sum::<f64>();
         settings.stretch_limit.min((1.0 + stretch / (self.stretch * share)).sqrt())
+    }
+
+    /// Whether a chart is better with another L2 stretch and so much more of its border, by its length on the surface, straight along the axes.
+    pub(crate) fn is_worth_straightening(&self, chart: &Chart, l2: f64, gained: f64) -> bool {
+        let added = self.of_stretch(chart, l2) - self.of_stretch(chart, chart.l2);
+        let bent = if unrolls(chart) { BENDING * added } else { added };
+        !may_bend(self.stretch) && bent <= self.straight * self.of_seam(gained)
     }
 
     /// Whether some charts are better than those in whose place they would come. That the limit allows it is no reason to bend what
     /// unrolls.
     pub(super) fn is_worth(&self, old: &[&Chart], new: &[Chart]) -> bool {
-        if !self.may_bend && old.iter().all(|chart| unrolls(chart)) && !new.iter().all(unrolls) {
+        if !self.may_bend && is_kept_unrolled(old) && !new.iter().all(unrolls) {
             return false;
         }
         let before: f64 = old.iter().map(|chart| self.of(chart)).sum();
@@ -159,9 +187,43 @@ impl Price {
     }
 }
 
+/// What a cut along an edge costs beside others: its length, less where seams are liked, and less over a bend.
+pub(super) fn of_cut(mesh: &TriMesh, h: HalfedgeId) -> f64 {
+    let t = mesh.twin(h);
+    let bend = if t.is_none() {
+        0.0
+    } else {
+        let [m, n] = [h, t].map(|h| measure::triangle_normal(mesh.triangle_positions(h.face())));
+        (1.0 - m.dot(&n)).max(0.0)
+    };
+    mesh.edge_length(h) * mesh.border_cost(h) / (1.0 + bend)
+}
+
 /// Whether a chart is as good as without stretch.
 fn unrolls(chart: &Chart) -> bool {
     chart.l2 <= UNROLLED
+}
+
+/// Whether what comes in the place of some charts has to unroll: where they all do, or one is a part between hard edges.
+fn is_kept_unrolled(charts: &[&Chart]) -> bool {
+    charts.iter().all(|chart| unrolls(chart)) || charts.iter().any(|chart| is_unrolled_part(chart))
+}
+
+/// Whether a chart is made of parts between hard edges, unrolled.
+fn is_unrolled_part(chart: &Chart) -> bool {
+    unrolls(chart) && chart.patch.mesh.faces().all(|f| chart.patch.mesh.part(f) != 0)
+}
+
+/// Whether a union of some charts cannot come under a limit: it is stretched no less than they are apart.
+pub(super) fn is_out_of_reach(old: &[&Chart], limit: f64) -> bool {
+    let (mut stretch, mut area) = (0.0, 0.0);
+    for chart in old {
+        let own = chart.patch.area();
+        stretch += own * chart.l2 * chart.l2;
+        area += own;
+    }
+    // Where each of them came to rest is its minimum but for a little.
+    (stretch / area).sqrt() > limit + AT_REST
 }
 
 /// Whether what unrolls may be bent: where stretch has no price, the limit alone says so.
@@ -206,14 +268,13 @@ mod tests {
         for scale in [1.0, 1e-3, 1e3] {
             let mesh = test_surfaces::grid(6, 4, [6.0 * scale, 4.0 * scale], 0.0);
             let (_, charts) = strips(&mesh, 6.0 * scale, 2);
-            let mut half = charts[0].clone();
+            let half = charts[0].clone();
             let root = 24.0_f64.sqrt();
             let price = price(&mesh, 8.0);
             // Half of a rectangle of 6 by 4: 14 around.
             assert!((price.of(&half) - CHART - 7.0 / root).abs() < 1e-9);
             assert!((price.of_seam(4.0 * scale) - 4.0 / root).abs() < 1e-9);
-            half.l2 = 1.1;
-            assert!((price.of_stretch(&half) - 8.0 * 0.5 * 0.21).abs() < 1e-9);
+            assert!((price.of_stretch(&half, 1.1) - 8.0 * 0.5 * 0.21).abs() < 1e-9);
         }
     }
 
@@ -295,6 +356,70 @@ mod tests {
         assert_eq!(price(&mesh, 20.0).limit_of_union(&old, 4.0, &settings), UNROLLED);
         assert_eq!(price(&mesh, 20.0).limit_of_union(&old[..1], 4.0, &settings), EXACT, "a cut closed");
         assert!(price(&mesh, 20.0).bending().limit_of_union(&old, 4.0, &settings) > 1.05);
+    }
+
+    #[test]
+    fn a_part_between_hard_edges_is_not_bent_for_a_neighbour_that_is() {
+        let flat = test_surfaces::grid(6, 4, [6.0, 4.0], 0.0);
+        let halves = strips(&flat, 6.0, 2).1;
+        // The first of the two strips is such a part.
+        let part = flat.faces().map(|f| u32::from(halves[0].patch.faces.contains(&f))).collect();
+        let mesh = flat.clone().with_parts(part);
+        let (one, two) = (strips(&mesh, 6.0, 1).1, strips(&mesh, 6.0, 2).1);
+        let union = |l2: f64| [Chart { l2, ..one[0].clone() }];
+        let bent = Chart { l2: 1.004, ..two[1].clone() };
+        let old = [&two[0], &bent];
+        let settings = Settings::default();
+        assert!(!price(&mesh, 20.0).is_worth(&old, &union(1.003)) && price(&mesh, 20.0).is_worth(&old, &union(1.0009)));
+        assert_eq!(price(&mesh, 20.0).limit_of_union(&old, 4.0, &settings), UNROLLED);
+        assert_eq!(price(&mesh, 20.0).exact().limit_of_union(&old, 4.0, &settings), EXACT);
+        assert!(price(&mesh, 20.0).bending().is_worth(&old, &union(1.003)), "two halves of one thing");
+        // The other one is no such part.
+        let unrolled = Chart { l2: 1.0, ..two[1].clone() };
+        let bent = Chart { l2: 1.004, ..two[0].clone() };
+        assert!(price(&mesh, 20.0).is_worth(&[&bent, &unrolled], &union(1.003)));
+    }
+
+    #[test]
+    fn a_union_is_stretched_no_less_than_its_parts() {
+        let mesh = test_surfaces::grid(6, 4, [6.0, 4.0], 0.0);
+        let halves = strips(&mesh, 6.0, 2).1;
+        let bent = Chart { l2: 1.1, ..halves[0].clone() };
+        let mean = (0.5 * (1.0 + 1.21_f64)).sqrt();
+        assert!(is_out_of_reach(&[&bent, &halves[1]], mean - 2.0 * AT_REST));
+        assert!(!is_out_of_reach(&[&bent, &halves[1]], mean));
+        assert!(!is_out_of_reach(&[&halves[0], &halves[1]], 1.0));
+    }
+
+    #[test]
+    fn straight_sides_are_worth_some_stretch_and_less_of_what_unrolls() {
+        let mesh = test_surfaces::grid(6, 4, [6.0, 4.0], 0.0);
+        let settings = |straighten, stretch_price| Settings { straighten, stretch_price, ..Settings::default() };
+        let bent = Chart { l2: 1.02, ..strips(&mesh, 6.0, 1).1[0].clone() };
+        let unrolled = Chart { l2: 1.0, ..bent.clone() };
+        let gained = 4.0;
+        let worth = 0.25 * gained / 24.0_f64.sqrt();
+        let price = Price::new(&mesh, &settings(0.25, 20.0));
+        let up_to = |l2: f64, worth: f64| (l2 * l2 + worth / 20.0).sqrt();
+        for (chart, limit) in [(&bent, up_to(1.02, worth)), (&unrolled, up_to(1.0, worth / BENDING))] {
+            assert!(price.is_worth_straightening(chart, limit - 1e-9, gained));
+            assert!(!price.is_worth_straightening(chart, limit + 1e-9, gained));
+        }
+        assert!(!Price::new(&mesh, &settings(0.0, 20.0)).is_worth_straightening(&bent, 1.021, gained));
+        assert!(!Price::new(&mesh, &settings(0.25, 0.0)).is_worth_straightening(&bent, 1.02, gained));
+    }
+
+    #[test]
+    fn a_cut_over_a_bend_is_cheaper() {
+        let cube = test_surfaces::cubes([1, 1, 1], |_| true);
+        let is_edge = |h: HalfedgeId| {
+            let side = cube.position(cube.to(h)) - cube.position(cube.from(h));
+            side.iter().filter(|x| x.abs() > 0.5).count() == 1
+        };
+        for h in cube.halfedges() {
+            let share = of_cut(&cube, h) / cube.edge_length(h);
+            assert!((share - if is_edge(h) { 0.5 } else { 1.0 }).abs() < 1e-9, "{share}");
+        }
     }
 
     #[test]

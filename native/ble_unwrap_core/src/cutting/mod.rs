@@ -22,6 +22,7 @@ mod rigid_motion;
 mod search;
 mod state;
 mod symmetric;
+mod touch_up;
 mod trial;
 mod twins;
 mod whole;
@@ -38,7 +39,8 @@ use crate::flattening::Rungs;
 use crate::mesh::{FaceId, Groups, Surface, TriMesh};
 use crate::packing::PackSettings;
 use crate::progress::Cancelled;
-use crate::settings::{ChartScale, LimitOver, Moves, Settings};
+use crate::segmentation;
+use crate::settings::{ChartScale, LimitOver, Moves, Settings, Style};
 
 use atlas_limit::join_within_atlas;
 use charted::Charted;
@@ -47,6 +49,7 @@ use twins::{Placed, Twin, twins};
 
 pub(crate) use cost::Price;
 pub(crate) use divide::divide;
+pub(crate) use touch_up::touch_up;
 
 /// The charts of a component, and how they came about.
 type Made = (Vec<Chart>, Rungs);
@@ -72,8 +75,10 @@ pub(crate) fn cut(
     let polygon = &surface.polygon;
     let charted = Charted::new(run.progress, mesh.face_count());
     let patch_of = |component: usize| whole(mesh, polygon, components.group(component));
-    let of_component =
-        |component: usize| charts_of(&patch_of(component), components.group(component), settings, &charted, run);
+    let of_component = |component: usize| {
+        let patch = with_unrolling_parts(patch_of(component), settings);
+        charts_of(&patch, components.group(component), settings, &charted, run)
+    };
     let placed = |component: usize| {
         let patch = patch_of(component);
         let mut place = vec![Point3::origin(); patch.mesh.vertex_count()];
@@ -128,6 +133,9 @@ pub(crate) fn cut(
     if settings.limit_over == LimitOver::Atlas && settings.moves >= Moves::Join {
         charts = join_within_atlas(mesh, polygon, charts, settings, &mut rungs, run)?;
     }
+    if settings.limit_over == LimitOver::Atlas {
+        charts = touch_up(charts, &Price::new(mesh, settings), settings, &mut rungs, run.progress)?;
+    }
     if settings.moves == Moves::All {
         charts = cut_across(mesh, polygon, charts, settings, &mut rungs, run)?;
     }
@@ -141,6 +149,19 @@ fn whole(mesh: &Arc<TriMesh>, polygon: &[u32], faces: &[FaceId]) -> Patch {
     }
     let (part, _) = mesh.submesh(faces, |_| false);
     Patch::whole(Arc::new(part), faces.iter().map(|f| polygon[f.index()]).collect())
+}
+
+/// A component with its parts that unroll between hard edges, of which the paper's presets know nothing.
+fn with_unrolling_parts(whole: Patch, settings: &Settings) -> Patch {
+    if settings.moves != Moves::All || settings.style == Style::Organic {
+        return whole;
+    }
+    let parts = segmentation::unrolling_parts(&whole.mesh, &whole.polygon, settings.style == Style::Hard);
+    if parts.is_empty() {
+        return whole;
+    }
+    let mesh = Arc::unwrap_or_clone(whole.mesh).with_parts(parts);
+    Patch { mesh: Arc::new(mesh), ..whole }
 }
 
 /// The charts of a component, which is `faces` of the surface, or what they were under the same settings but for those of
@@ -164,5 +185,13 @@ fn charts_of(
         });
     };
     let bytes = |made: &Made| made.0.iter().map(|c| cache::bytes_of(&c.patch.mesh) + 24 * c.uv.len()).sum();
-    run.recall(Kind::Charts, input, bytes, || component::charts(whole, faces, settings, charted, run))
+    run.recall(Kind::Charts, input, bytes, || {
+        let (charts, mut rungs) = component::charts(whole, faces, settings, charted, run)?;
+        // Before they are copied. Under a limit over the atlas charts are still to be joined.
+        if settings.limit_over == LimitOver::Atlas {
+            return Ok((charts, rungs));
+        }
+        let price = Price::new(&whole.mesh, settings);
+        Ok((touch_up(charts, &price, settings, &mut rungs, run.progress)?, rungs))
+    })
 }

@@ -10,7 +10,7 @@ use crate::flattening::{Rung, Rungs};
 use crate::progress::Cancelled;
 use crate::settings::Settings;
 
-use super::cost::Price;
+use super::cost::{self, Price};
 use super::history::{History, MoveKind};
 use super::moves::{Move, Site};
 use super::state::{ChartId, Cutting};
@@ -91,11 +91,14 @@ pub(super) fn tried(
 ) -> Result<(Verdict, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
     let mut verdict = Verdict::Refused;
-    let price = price.map(|price| if made.may_bend() { price.bending() } else { *price });
+    let price = price.map(|price| made.price(*price));
     let old: Vec<&Chart> = site.charts.iter().filter_map(|&id| cutting.chart(id)).collect();
     for way in made.ways(cutting, site, run)? {
         let glued = way.edit.glued_length(cutting);
         let stretch_limit = price.map_or(settings.stretch_limit, |price| price.limit_of_union(&old, glued, settings));
+        if price.is_some() && cost::is_out_of_reach(&old, stretch_limit) {
+            continue;
+        }
         let under_price = Settings { stretch_limit, ..settings.clone() };
         match trial(cutting, &way, &under_price, &mut rungs, run)? {
             Verdict::Refused => (),

@@ -115,8 +115,8 @@ impl Move for InPlane<'_> {
     }
 
     // They were divided for the sake of symmetry, not because they unroll.
-    fn may_bend(&self) -> bool {
-        true
+    fn price(&self, usual: Price) -> Price {
+        usual.bending()
     }
 
     fn sites(&self, cutting: &Cutting<'_>, history: &History, price: &Price) -> Vec<Site> {

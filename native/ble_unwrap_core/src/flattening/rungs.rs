@@ -47,10 +47,12 @@ pub(crate) enum Rung {
     Unbend,
     /// Triangles stretched far more than the others of a chart were relaxed.
     Relax,
+    /// Sides that are straight on the surface were laid along the axes.
+    Straighten,
 }
 
 impl Rung {
-    const ALL: [Self; 22] = [
+    const ALL: [Self; 23] = [
         Self::Plane,
         Self::Unfold,
         Self::Projection,
@@ -73,6 +75,7 @@ impl Rung {
         Self::Copied,
         Self::Unbend,
         Self::Relax,
+        Self::Straighten,
     ];
 
     /// A short name for reports.
@@ -101,6 +104,7 @@ impl Rung {
             Self::Copied => "copied",
             Self::Unbend => "unbend",
             Self::Relax => "relax",
+            Self::Straighten => "straighten",
         }
     }
 }

@@ -1,10 +1,10 @@
-//! Charts to atlas: touch up, scale, pack, round, check, and mend what the checks find.
+//! Charts to atlas: scale, pack, round, check, and mend what the checks find.
 
 mod mend;
 mod placed;
+mod quads;
 mod scale;
 mod summary;
-mod touch_up;
 
 use std::collections::BTreeSet;
 
@@ -12,6 +12,7 @@ use crate::atlas::Atlas;
 use crate::cache::Run;
 use crate::charts::Chart;
 use crate::clock::Clock;
+use crate::cutting::{self, Price};
 use crate::error::UnwrapError;
 use crate::flattening::Rungs;
 use crate::mesh::{MeshInput, Surface};
@@ -44,8 +45,6 @@ pub(crate) fn lay_out(
     let mut packing = settings.packing.clone();
     let mut round = 0;
     loop {
-        charts = touch_up::touch_up(charts, settings, &mut rungs, run.progress)?;
-        clock.lap("touch up");
         run.progress.enter(Stage::Pack);
         scale::scale(&mut charts, settings);
         let layout = Placed::new(input, surface, &charts, &packing, run.progress)?;
@@ -72,6 +71,8 @@ pub(crate) fn lay_out(
                     certificate.faulty_charts.iter().filter_map(|&c| usize::try_from(c).ok()).collect();
                 let faults = Faults { round, faulty: &faulty, broken: &layout.broken };
                 charts = mend::mend(surface, charts, &faults, &mut rungs, settings, run)?;
+                let price = Price::new(&surface.mesh, settings);
+                charts = cutting::touch_up(charts, &price, settings, &mut rungs, run.progress)?;
             }
         }
         clock.lap("mend");

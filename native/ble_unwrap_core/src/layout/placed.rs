@@ -9,7 +9,7 @@ use crate::packing::{self, PackItem, PackSettings, Packed};
 use crate::progress::Progress;
 use crate::rounding::{self, Rounding, RoundingError};
 
-use super::touch_up;
+use super::quads;
 
 /// Charts packed and rounded.
 pub(super) struct Placed {
@@ -46,7 +46,7 @@ impl Placed {
                 Point2::new(texel.x / size[0], texel.y / size[1])
             };
             let exact: Vec<Point2<f64>> = chart.uv.iter().map(place).collect();
-            let halves = touch_up::convex_halves(chart);
+            let halves = quads::convex_halves(chart);
             let uv = match rounding::round_to_f32(&chart.patch.mesh, &halves, &exact, &rounding, progress) {
                 Ok(rounded) => rounded.uv,
                 Err(RoundingError::Cancelled(cancelled)) => return Err(cancelled.into()),

@@ -6,7 +6,7 @@ use crate::report::{Report, counted};
 use crate::settings::{LimitOver, Settings};
 
 use super::placed::Placed;
-use super::touch_up;
+use super::quads;
 
 /// The figures of a layout, and what the user should know of it.
 pub(super) fn report_of(
@@ -27,7 +27,7 @@ pub(super) fn report_of(
     }
     report.bent_quads = metrics::bent_quads(input, &layout.uv, |face| layout.polygon_chart[face] >= 0).len();
     if report.bent_quads > 0 {
-        report.warnings.push(touch_up::warning(report.bent_quads));
+        report.warnings.push(quads::warning(report.bent_quads));
     }
     if let Some(&(chart, l2)) = report.charts_over_limit.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
         report.warnings.push(format!(

@@ -28,6 +28,8 @@ pub(crate) struct TriMesh {
     guide: Vec<bool>,
     /// What a border at each vertex counts for its length; empty where that is 1 everywhere.
     dislike: Vec<f32>,
+    /// The part between hard edges that each face is in, from 1 on, and 0 for none; empty where all are in none.
+    part: Vec<u32>,
 }
 
 /// What a border along a guide counts for its length: a little less than along the edge of a box. It may take a way so
@@ -133,7 +135,10 @@ impl TriMesh {
         }
         let positions = source.iter().map(|&s| position(s)).collect();
         let triangles = corner_vertex.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
-        (Self { positions, triangles, twin, outgoing, guide: Vec::new(), dislike: Vec::new() }, source)
+        (
+            Self { positions, triangles, twin, outgoing, guide: Vec::new(), dislike: Vec::new(), part: Vec::new() },
+            source,
+        )
     }
 
     /// Builds a mesh from vertex indices, gluing every pair of opposed half-edges.
@@ -228,7 +233,8 @@ impl TriMesh {
         let (mesh, source) = Self::from_glued(&corner_source, twin, |s| self.positions[s as usize]);
         let source: Vec<VertexId> = source.into_iter().map(|s| VertexId::new(s as usize)).collect();
         let dislike = self.dislike_of(&source);
-        (mesh.with_guides(guide).with_dislike(dislike), source)
+        let part = if self.part.is_empty() { Vec::new() } else { faces.iter().map(|&f| self.part(f)).collect() };
+        (mesh.with_guides(guide).with_dislike(dislike).with_parts(part), source)
     }
 
     /// Number of vertices.
@@ -392,6 +398,23 @@ impl TriMesh {
     /// What a border counts for its length at some vertices, for a mesh made of them.
     pub(crate) fn dislike_of(&self, vertices: &[VertexId]) -> Vec<f32> {
         if self.dislike.is_empty() { Vec::new() } else { vertices.iter().map(|v| self.dislike[v.index()]).collect() }
+    }
+
+    /// The same mesh with the part between hard edges that each face is in, or nothing where there are none.
+    ///
+    /// # Panics
+    /// If there is neither a number for each face nor none at all.
+    #[must_use]
+    pub(crate) fn with_parts(self, part: Vec<u32>) -> Self {
+        assert!(part.is_empty() || part.len() == self.triangles.len(), "one number a face");
+        Self { part: if part.iter().any(|p| *p != 0) { part } else { Vec::new() }, ..self }
+    }
+
+    /// The part between hard edges that a face is in, which unrolls and is not to be bent; 0 for none.
+    #[inline]
+    #[must_use]
+    pub(crate) fn part(&self, f: FaceId) -> u32 {
+        self.part.get(f.index()).copied().unwrap_or(0)
     }
 
     /// What a border along an edge costs beside one of the same length at a place of the usual kind: less on a guide, and less where

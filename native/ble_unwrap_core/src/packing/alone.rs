@@ -5,13 +5,15 @@ use nalgebra::Vector2;
 use super::grid::Grid;
 use super::outline::Outline;
 use super::placement::{Dense, Place};
-use super::pose::{aligned_turn, turn_alone};
+use super::pose::{aligned_turn, symmetric_turn, turn_alone};
 use super::raster::rasterise;
 use super::shape::SAFETY_TEXELS;
 use super::{PackSettings, Pose, Rotation};
 
 /// Cells along the longer side of the raster that tells how much of the texture the chart touches.
 const RASTER: f64 = 512.0;
+/// A symmetric chart is laid upright or level if it can be at least so many times as large as at the best angle.
+const UPRIGHT: f64 = 0.9;
 
 /// The chart `which` of `outlines`, the only one with triangles and with an extent, as large as the
 /// texture allows, in its middle.
@@ -24,8 +26,14 @@ pub(super) fn alone(outlines: &[Outline], which: usize, grid: Grid, settings: &P
         let [upright, lying] = [[c, s], [-s, c]].map(|turn| (fit(outline, turn, room).scale, turn));
         if lying.0 > upright.0 { lying.1 } else { upright.1 }
     };
+    let settled = || {
+        let any = turn_alone(outline, room);
+        let is_worth = |turn| fit(outline, turn, room).scale >= UPRIGHT * fit(outline, any, room).scale;
+        let upright = || symmetric_turn(outline).map(upright_or_lying).filter(|&turn| is_worth(turn));
+        aligned_turn(outline).map(upright_or_lying).or_else(upright).unwrap_or(any)
+    };
     let turn = match settings.rotation {
-        Rotation::Aligned => aligned_turn(outline).map_or_else(|| turn_alone(outline, room), upright_or_lying),
+        Rotation::Aligned => settled(),
         Rotation::Any => turn_alone(outline, room),
         Rotation::None => given,
         Rotation::Quarter => upright_or_lying([1.0, 0.0]),

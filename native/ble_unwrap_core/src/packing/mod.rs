@@ -68,7 +68,7 @@ use outline::Outline;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Rotation {
-    /// Along the axes, or upright, where much of a chart's border is straight; any angle for the others.
+    /// Along the axes where much of a chart's border is straight, upright or level where a chart is symmetric; any angle for the others.
     Aligned,
     /// Any angle.
     Any,
@@ -79,7 +79,7 @@ pub enum Rotation {
 }
 
 choices!(Rotation {
-    Aligned: "aligned", "Aligned", "Charts with straight borders lie along the axes, the others at any angle.";
+    Aligned: "aligned", "Aligned", "Charts with straight borders lie along the axes, symmetric ones upright or level, others at any angle.";
     Any: "any", "Any", "Charts are turned by any angle, which packs tightest.";
     Quarter: "quarter", "Quarter Turns", "Charts are turned by multiples of 90° from how they were flattened, not set upright.";
     None: "none", "None", "Charts stay as they were flattened, at whatever angle that is.";

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 
 use super::Rotation;
 use super::outline::{Edge, Outline};
@@ -10,19 +10,26 @@ use super::outline::{Edge, Outline};
 /// Angles compared for a chart alone in the texture, over half a turn.
 const ALONE: usize = 720;
 
-/// A chart is laid along the axes where more than this share of its border then lies along them: more than a triangle of equal sides has.
-const ALIGNED: f64 = 0.35;
+/// A chart is laid along the axes where more than this share of its border then lies along them: an octagon has half, a triangle of equal
+/// sides a third, what has grown a twentieth.
+const ALIGNED: f64 = 0.25;
+/// An outline is symmetric if the mirror image of each point is so near to it, in units of its extent.
+const MIRRORED: f64 = 0.01;
+/// So many points of an outline are mirrored at most.
+const MIRRORED_POINTS: usize = 200;
+/// The moments of a border along its two axes differ by at least this share of their sum, or the axes are anybody's guess.
+const LEAST_LONGER: f64 = 0.02;
 /// What is up to so far from an axis counts as along it, in radians.
 const ALONG: f64 = PI / 180.0;
 
 /// Cosine and sine of the base angles of a chart; the other poses are quarter turns of these.
 ///
-/// The first lays the minimum-area rectangle flat ([`Rotation::Any`]) or is the given pose. A chart that is laid along the axes has no
-/// other.
+/// The first lays the minimum-area rectangle flat ([`Rotation::Any`]) or is the given pose. A chart that is laid along the axes or upright has
+/// no other.
 pub(super) fn base_turns(outline: &Outline, rotation: Rotation, angles: usize) -> Vec<[f64; 2]> {
     match rotation {
         Rotation::Aligned => {
-            if let Some(turn) = aligned_turn(outline) {
+            if let Some(turn) = aligned_turn(outline).or_else(|| symmetric_turn(outline)) {
                 return vec![turn];
             }
         }
@@ -76,6 +83,46 @@ pub(super) fn aligned_turn(outline: &Outline) -> Option<[f64; 2]> {
     Some([cos, -sin])
 }
 
+/// The turn that makes the mirror axis of an outline upright, if it has one. Such an axis is one of the two along which its border spreads most
+/// and least; a disc has many, and needs none. O(n).
+pub(super) fn symmetric_turn(outline: &Outline) -> Option<[f64; 2]> {
+    let sides = || outline.edges.iter().map(|edge| [edge.from, edge.to].map(|v| outline.points[v as usize]));
+    let whole: f64 = sides().map(|[p, q]| (q - p).norm()).sum();
+    let mean = sides().map(|[p, q]| (p.coords + q.coords) * (0.5 * (q - p).norm())).sum::<Vector2<f64>>() / whole;
+    // Moments of second order.
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for [p, q] in sides() {
+        let (length, at) = ((q - p).norm(), 0.5 * (p.coords + q.coords) - mean);
+        xx += length * at.x * at.x;
+        xy += length * at.x * at.y;
+        yy += length * at.y * at.y;
+    }
+    let (apart, spread) = ((xx - yy).hypot(2.0 * xy), xx + yy);
+    if spread.is_nan() || apart <= LEAST_LONGER * spread {
+        return None;
+    }
+    let (sin, cos) = (0.5 * (2.0 * xy).atan2(xx - yy)).sin_cos();
+    let step = outline.points.len().div_ceil(MIRRORED_POINTS).max(1);
+    let is_axis = |along: Vector2<f64>| {
+        let image = |p: &Point2<f64>| {
+            let at = p.coords - mean;
+            Point2::from(mean + along * (2.0 * along.dot(&at)) - at)
+        };
+        let is_near = |p: Point2<f64>| sides().any(|side| distance(p, side) <= MIRRORED);
+        outline.points.iter().step_by(step).map(image).all(is_near)
+    };
+    let axis = [Vector2::new(cos, sin), Vector2::new(-sin, cos)].into_iter().find(|&along| is_axis(along))?;
+    Some([axis.y, axis.x])
+}
+
+/// From a point to a side.
+fn distance(p: Point2<f64>, [from, to]: [Point2<f64>; 2]) -> f64 {
+    let (side, at) = (to - from, p - from);
+    let share = (side.dot(&at) / side.norm_squared()).clamp(0.0, 1.0);
+    // A side without length.
+    if share.is_nan() { at.norm() } else { (at - side * share).norm() }
+}
+
 /// The turn in which a chart alone fits a rectangle of `inner` width and height at the largest scale:
 /// the minimum-area rectangle's or the best of half a turn in quarters of a degree.
 pub(super) fn turn_alone(outline: &Outline, inner: [f64; 2]) -> [f64; 2] {
@@ -124,9 +171,9 @@ fn flat_turn(outline: &Outline) -> [f64; 2] {
             continue;
         }
         let along = edge(k) / length;
-        let up = nalgebra::Vector2::new(-along.y, along.x);
+        let up = Vector2::new(-along.y, along.x);
         // Each caliper only advances: at most n steps altogether, bounded here by 2n for rounding.
-        let advance = |at: &mut usize, dir: nalgebra::Vector2<f64>| {
+        let advance = |at: &mut usize, dir: Vector2<f64>| {
             for _ in 0..2 * n {
                 if edge(*at % n).dot(&dir) <= 0.0 {
                     break;
@@ -258,7 +305,7 @@ mod tests {
                 assert!(turned[0].abs().min(turned[1].abs()) < 1e-9, "{turned:?} at {angle}");
             }
         }
-        for sides in [3, 12, 40] {
+        for sides in [5, 20, 40] {
             let corner = |k: usize| {
                 let (s, c) = (2.0 * PI * k as f64 / f64::from(sides)).sin_cos();
                 Point2::new(c, s)
@@ -267,6 +314,28 @@ mod tests {
             assert_eq!(aligned_turn(&outline(&round)), None, "{sides} sides");
             assert_eq!(base_turns(&outline(&round), Rotation::Aligned, 5).len(), 5);
         }
+    }
+
+    #[test]
+    fn a_symmetric_chart_is_laid_upright_or_level_and_others_are_not() {
+        // A drop, mirrored in its long axis; and the same with a dent on one side.
+        let drop = |angle: f64, dent: f64| -> Vec<Point2<f64>> {
+            let (s, c) = angle.sin_cos();
+            let at = |k: u32| {
+                let (sin, cos) = (2.0 * PI * f64::from(k) / 48.0).sin_cos();
+                let shorter = 1.0 - dent * (-((sin - 0.8) / 0.2).powi(2)).exp();
+                let (x, y) = ((2.0 + cos) * cos, shorter * sin);
+                Point2::new(c * x - s * y, s * x + c * y)
+            };
+            (0..48).map(at).collect()
+        };
+        for angle in [0.0_f64, 0.4, 1.1, 2.5] {
+            let [c, s] = symmetric_turn(&outline(&drop(angle, 0.0))).expect("symmetric");
+            let axis = [c * angle.cos() - s * angle.sin(), s * angle.cos() + c * angle.sin()];
+            assert!(axis[0].abs() < 1e-6, "upright: {axis:?} at {angle}");
+            assert_eq!(symmetric_turn(&outline(&drop(angle, 0.3))), None);
+        }
+        assert_eq!(symmetric_turn(&Outline::new(&PackItem { points: &[], triangles: &[] }, 0).expect("empty")), None);
     }
 
     #[test]

@@ -121,6 +121,24 @@ choices!(Symmetry {
     Off: "off", "Off", "Seams are found without regard to mirror planes.";
 });
 
+/// What kind of thing a mesh is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Style {
+    /// Each connected piece by what it is: manufactured where most of it unrolls between hard edges.
+    Auto,
+    /// Grown: hard edges are places like others.
+    Organic,
+    /// Manufactured: all that unrolls between hard edges keeps its shape.
+    Hard,
+}
+
+choices!(Style {
+    Auto: "auto", "Auto", "Each connected piece by what it is.";
+    Organic: "organic", "Organic", "Hard edges are places like others.";
+    Hard: "hard", "Hard Surface", "All that unrolls between hard edges keeps its shape, and they count from a lower angle on.";
+});
+
 /// How charts are scaled relative to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -215,6 +233,13 @@ pub struct Settings {
     /// Whether charts of mirrored surfaces are mirrored, too. A mirror plane is one that takes every vertex of a connected piece to
     /// another, to a thousandth of its size, and every polygon to another. UVs are not mirrored: each half has its own place.
     pub symmetry: Symmetry,
+    /// What kind of thing the mesh is. Planes, walls of cylinders and the like between hard edges are not bent: they come out as they are, and
+    /// are joined to others only where what comes of that unrolls, too.
+    pub style: Style,
+    /// How much seam a straight side is worth that lies along an axis of the texture: where the border of a chart runs straight on the surface
+    /// between two corners, it is made straight in the chart, and laid along an axis, if that costs less in stretch than so many times its
+    /// length costs as seam. Has no effect where `stretch_price` is 0.
+    pub straighten: f64,
     /// What happens to the holes of charts.
     pub holes: Holes,
     /// How charts are scaled relative to each other.
@@ -251,6 +276,8 @@ impl Default for Settings {
             hide_seams: 2.0,
             front: Front::None,
             symmetry: Symmetry::Auto,
+            style: Style::Auto,
+            straighten: 0.25,
             holes: Holes::Keep,
             chart_scale: ChartScale::Uniform,
             together_max: 0,
@@ -280,6 +307,8 @@ impl Settings {
             stretch_price: 0.0,
             hide_seams: 0.0,
             symmetry: Symmetry::Off,
+            style: Style::Organic,
+            straighten: 0.0,
             segmentation: SegmentationSettings::paper(),
             together_max: PAPER_TOGETHER_MAX,
             geodesics: GeodesicSettings::paper(),

@@ -15,6 +15,7 @@
 //! barrier), Smith et al. 2019 (closed-form Hessians), Garanzha et al. 2021 (flips), Tutte 1963 and Floater
 //! 2003 (convex embeddings).
 
+mod alignment;
 mod barrier;
 mod bulge;
 mod convex_outline;
@@ -33,7 +34,9 @@ mod other_halves;
 mod overlap;
 mod part_boundary;
 mod peaks;
+mod sides;
 mod stitch;
+mod straighten_sides;
 mod system;
 #[cfg(test)]
 mod test_meshes;
@@ -52,6 +55,7 @@ pub(crate) use overlap::{boundary_is_simple, first_flip};
 pub(crate) use part_boundary::{boundary_is_tangled, part_boundary};
 pub(crate) use peaks::lower_peaks;
 pub(crate) use stitch::Stitcher;
+pub(crate) use straighten_sides::straighten_sides;
 pub(crate) use tutte::{TutteBoundary, tutte_embedding};
 pub(crate) use unbend::unbend;
 

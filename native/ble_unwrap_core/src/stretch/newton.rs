@@ -2,6 +2,7 @@
 
 use nalgebra::Point2;
 
+use super::alignment::Alignment;
 use super::barrier::Barrier;
 use super::energy::{IsotropicEnergy, PeakEnergy, StretchEnergy};
 use super::measure::{plane_area, surface_area};
@@ -45,6 +46,9 @@ const MOST_WORST: f64 = 0.05;
 const WORST_RINGS: usize = 4;
 /// The worst triangles are mended by so many steps at most.
 const WORST_STEPS: usize = 12;
+/// Drawing edges to the axes goes on to the next weight when a step gains less than this share.
+const ALIGN_TOLERANCE: f64 = 1e-3;
+
 /// Mending the worst triangles ends when a step gains less than this share.
 const WORST_TOLERANCE: f64 = 1e-2;
 
@@ -195,10 +199,37 @@ pub(super) fn relax_peak(
     Ok(descent.uv)
 }
 
+/// Lowers the energy of all triangles, the other halves of quads among them, while edges are drawn to the axes: by each of some weights
+/// in turn, as long as `may_go_on` says of the map. From a map where all are positive; none collapses.
+pub(super) fn relax_aligned(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    halves: &OtherHalves,
+    start: Vec<Point2<f64>>,
+    alignment: &Alignment,
+    weights: &[f64],
+    may_go_on: &dyn Fn(&[Point2<f64>]) -> bool,
+    settings: &StretchSettings,
+    progress: &Progress,
+) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
+    let energy = StretchEnergy::new(settings.dirichlet_weight);
+    let mut descent = Descent::new(mesh, rest, halves, start, Vec::new(), None)?;
+    for &weight in weights {
+        descent.alignment = alignment.weighing(weight);
+        descent.take_steps(mesh, &energy, settings.max_iterations, ALIGN_TOLERANCE, progress)?;
+        if !may_go_on(&descent.uv) {
+            return Ok(None);
+        }
+    }
+    Ok(Some(descent.uv))
+}
+
 /// Everything one Newton step works on.
 struct Descent<'a> {
     system: ChartSystem<'a>,
     barrier: Option<Barrier>,
+    /// Edges that are to lie along the axes; none if empty.
+    alignment: Alignment,
     /// Vertices that stay; none if empty.
     pinned: Vec<bool>,
     uv: Vec<Point2<f64>>,
@@ -218,11 +249,19 @@ impl<'a> Descent<'a> {
     ) -> Result<Self, StretchError> {
         let barrier = keep_apart.map(|reach| Barrier::new(mesh, rest, reach));
         let (trial, direction) = (uv.clone(), vec![0.0; 2 * uv.len()]);
-        Ok(Self { system: ChartSystem::new(mesh, rest, halves)?, barrier, pinned, direction, uv, trial })
+        Ok(Self {
+            system: ChartSystem::new(mesh, rest, halves)?,
+            barrier,
+            alignment: Alignment::default(),
+            pinned,
+            direction,
+            uv,
+            trial,
+        })
     }
 
     fn value<E: IsotropicEnergy>(&self, energy: &E, uv: &[Point2<f64>]) -> f64 {
-        let own = self.system.faces.value(energy, uv);
+        let own = self.system.faces.value(energy, uv) + self.alignment.value(uv);
         match &self.barrier {
             Some(barrier) if own.is_finite() => own + barrier.value(uv),
             _ => own,
@@ -255,6 +294,7 @@ impl<'a> Descent<'a> {
         if let Some(barrier) = &self.barrier {
             barrier.assemble(&self.uv, &mut self.system);
         }
+        self.alignment.assemble(&self.uv, &mut self.system);
         let slope = self.system.solve_pinned(&self.pinned, &mut self.direction)?;
         let mut step = (SAFETY * self.system.faces.first_flip(&self.uv, &self.direction)).min(1.0);
         if let Some(barrier) = &self.barrier {

@@ -71,6 +71,10 @@ class _ChartsGroup(TypedDict, total=False):
     """Which side is looked at most. "none": No side more than another. "x": Seams are drawn away from what faces along X. "-x": Seams are drawn away from what faces against X. "y": Seams are drawn away from what faces along Y. "-y": Seams are drawn away from what faces against Y, as the faces of figures do in Blender. "z": Seams are drawn away from what faces along Z. "-z": Seams are drawn away from what faces against Z."""
     symmetry: Literal["auto", "off"]
     """Whether seams of mirrored surfaces are mirrored, too. "auto": Where a piece has a mirror plane along edges, so have its seams. "off": Seams are found without regard to mirror planes."""
+    style: Literal["auto", "organic", "hard"]
+    """Whether planes, cylinders and the like between hard edges keep their shape. "auto": Each connected piece by what it is. "organic": Hard edges are places like others. "hard": All that unrolls between hard edges keeps its shape, and they count from a lower angle on."""
+    straighten: float
+    """How much seam a straight side along an axis of the texture is worth. Sides of charts that are straight on the surface are made straight where that costs less in stretch; 0 leaves them as they are."""
     moves: Literal["split", "join", "all"]
     """What the search for charts may do. "split": Patches are split until they keep the stretch limit. "join": Neighbouring charts are joined again where they keep the limit together. "all": Charts may be cut open, unfolded and joined along a part of their border, too."""
     holes: Literal["keep", "cut"]
@@ -152,7 +156,7 @@ class _TextureGroup(TypedDict, total=False):
 @type_check_only
 class _PackingGroup(TypedDict, total=False):
     rotation: Literal["aligned", "any", "quarter", "none"]
-    """How charts may be turned to pack them tighter. "aligned": Charts with straight borders lie along the axes, the others at any angle. "any": Charts are turned by any angle, which packs tightest. "quarter": Charts are turned by multiples of 90° from how they were flattened, not set upright. "none": Charts stay as they were flattened, at whatever angle that is."""
+    """How charts may be turned to pack them tighter. "aligned": Charts with straight borders lie along the axes, symmetric ones upright or level, others at any angle. "any": Charts are turned by any angle, which packs tightest. "quarter": Charts are turned by multiples of 90° from how they were flattened, not set upright. "none": Charts stay as they were flattened, at whatever angle that is."""
 
 @type_check_only
 class _UnwrapSettings(

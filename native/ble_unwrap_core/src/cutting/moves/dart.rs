@@ -16,6 +16,8 @@ use crate::mesh::{HalfedgeId, VertexId};
 use crate::progress::Cancelled;
 use crate::stretch::{self, Bulge, StretchError};
 
+use super::super::cost;
+
 /// A patch is promising if its conformal map has at most so many times the stretch above 1 that the limit allows; the map of
 /// least stretch has far less, as it need not keep angles. A dart too many is closed again, one too few makes a split of it: over
 /// nine models without a stretch price 6 instead of 3.6 costs 5 % more in charts and seam, over 13 closed meshes under limits
@@ -121,7 +123,7 @@ pub(super) fn is_guided(patch: &Patch) -> bool {
 /// A patch cut from an inner vertex to the boundary, or on a closed surface to its root.
 pub(super) fn cut_to(patch: &Patch, tip: VertexId, root: Option<VertexId>) -> Option<Patch> {
     let mesh = &patch.mesh;
-    let length = |h: HalfedgeId| mesh.edge_length(h) * mesh.border_cost(h);
+    let length = |h: HalfedgeId| cost::of_cut(mesh, h);
     let dart = charts::shortest_path_to_boundary(mesh, tip, root, length, |h| patch.is_diagonal(h))?;
     // One edge of a closed surface, cut, opens nothing.
     let least = if root.is_some() { 2 } else { 1 };

@@ -59,9 +59,9 @@ pub(super) struct Site {
 pub(super) trait Move: Sync {
     fn kind(&self) -> MoveKind;
 
-    /// Whether charts that unroll may be glued to one that does not, where the price says so.
-    fn may_bend(&self) -> bool {
-        false
+    /// The prices that the move is judged by.
+    fn price(&self, usual: Price) -> Price {
+        usual
     }
 
     /// Where it may be made, best first. A site that has been refused often enough is none, so that the search ends.

@@ -44,6 +44,10 @@ impl Move for PartialJoin {
         MoveKind::PartialJoin
     }
 
+    fn price(&self, usual: Price) -> Price {
+        usual.exact()
+    }
+
     fn sites(&self, cutting: &Cutting<'_>, history: &History, _price: &Price) -> Vec<Site> {
         let is_open = |id: ChartId| history.failures(MoveKind::PartialJoin, id) < MOST_FAILURES;
         let mut parts: Vec<Part> = Vec::new();

@@ -7,30 +7,16 @@ use crate::charts::Patch;
 use crate::flattening::{Rung, Rungs};
 use crate::progress::Cancelled;
 use crate::segmentation::{self, Segmentation};
-use crate::settings::{Moves, Settings};
+use crate::settings::Settings;
 
 use super::super::measured::Measured;
 
 /// Spectral splits that deep have not helped; halving by breadth-first order always ends.
 const MOST_SPECTRAL_SPLITS: u32 = 24;
-/// A patch that is split comes apart at its hard edges where parts that unroll have at least this share of its area.
-const MOSTLY_UNROLLED: f64 = 0.9;
 
-/// Share of the area that unrolls where all of it does. A little is left to rounding.
-const ALL: f64 = 1.0 - 1e-6;
-
-/// The parts of a patch between its hard edges, if all of them unroll: a cylinder's wall and its caps. Not in the paper's presets.
-pub(crate) fn unrolling_parts(patch: &Patch, settings: &Settings) -> Option<Vec<Patch>> {
-    hard_parts(patch, ALL, settings)
-}
-
-/// The parts of a patch between its hard edges, if those that unroll have at least a share of its area, and not in the paper's
-/// presets.
-fn hard_parts(patch: &Patch, least_share: f64, settings: &Settings) -> Option<Vec<Patch>> {
-    if settings.moves != Moves::All {
-        return None;
-    }
-    let parts = segmentation::between_hard_edges(&patch.mesh, &patch.polygon, least_share)?;
+/// The unrolling parts of a patch between its hard edges and what is left of it; `None` where it has nothing to come apart.
+pub(crate) fn hard_parts(patch: &Patch) -> Option<Vec<Patch>> {
+    let parts = segmentation::between_parts(&patch.mesh)?;
     Some(patch.split(&parts.label, parts.parts))
 }
 
@@ -44,7 +30,7 @@ pub(crate) fn split(
     run: &Run<'_>,
 ) -> Result<Vec<Patch>, Cancelled> {
     let patch = measured.patch;
-    if let Some(parts) = hard_parts(patch, MOSTLY_UNROLLED, settings) {
+    if let Some(parts) = hard_parts(patch) {
         rungs.take(Rung::Split);
         return Ok(parts);
     }

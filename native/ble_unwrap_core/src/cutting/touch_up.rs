@@ -1,5 +1,5 @@
-//! Charts touched up before they are packed: quads bent in the plane are made convex again, and triangles stretched far more than
-//! the others are relaxed.
+//! Charts touched up once it is known where to cut: quads bent in the plane are made convex again, triangles stretched far more than
+//! the others are relaxed, and sides that are straight on the surface are laid along the axes.
 
 use std::sync::Arc;
 
@@ -7,27 +7,31 @@ use nalgebra::Point2;
 use rayon::prelude::*;
 
 use crate::charts::Chart;
-use crate::distortion::{self, RestTriangle};
+use crate::distortion::RestTriangle;
+use crate::embedding;
 use crate::flattening::{self, Rung, Rungs};
-use crate::mesh::{Quad, VertexId};
+use crate::mesh::Quad;
 use crate::progress::{Cancelled, Progress};
 use crate::settings::{LimitOver, Moves, Settings};
 use crate::stretch::{self, StretchError};
+
+use super::cost::Price;
 
 /// The L2 stretch of a chart may rise by so much for its L-infinity stretch to fall.
 const MOST_RISE: f64 = 1e-3;
 
 /// The charts with their quads convex wherever they are so on the surface and that can be had, and, but in the paper's presets,
-/// with less L-infinity stretch; all others stay as they are.
-pub(super) fn touch_up(
+/// with less L-infinity stretch and straight sides, where that is worth it by `price`; all others stay as they are.
+pub(crate) fn touch_up(
     charts: Vec<Chart>,
+    price: &Price,
     settings: &Settings,
     rungs: &mut Rungs,
     progress: &Progress,
 ) -> Result<Vec<Chart>, Cancelled> {
     let rise = affordable_rise(&charts, settings);
     let touched: Vec<Result<(Chart, Rungs), Cancelled>> =
-        charts.into_par_iter().map(|chart| touched_up(chart, rise, settings, progress)).collect();
+        charts.into_par_iter().map(|chart| touched_up(chart, rise, price, settings, progress)).collect();
     let mut charts = Vec::with_capacity(touched.len());
     for chart in touched {
         let (chart, steps) = chart?;
@@ -56,6 +60,7 @@ fn affordable_rise(charts: &[Chart], settings: &Settings) -> f64 {
 fn touched_up(
     mut chart: Chart,
     rise: f64,
+    price: &Price,
     settings: &Settings,
     progress: &Progress,
 ) -> Result<(Chart, Rungs), Cancelled> {
@@ -85,6 +90,20 @@ fn touched_up(
             rungs.take(Rung::Relax);
         }
     }
+    // A plane keeps its shape.
+    if settings.moves == Moves::All && settings.straighten > 0.0 && embedding::plane(&mesh).is_none() {
+        let is_worth = |uv: &[Point2<f64>], gained: f64| {
+            let l2 = flattening::l2(&chart.patch, &rest, uv);
+            l2 <= limit.min(first + rise) && price.is_worth_straightening(&chart, l2, gained)
+        };
+        let (uv, settings) = (&chart.uv, &settings.stretch);
+        let straight = stretch::straighten_sides(&mesh, &rest, &quads, uv, &is_worth, settings, progress);
+        if let Some(uv) = or_nothing(straight)? {
+            chart.l2 = flattening::l2(&chart.patch, &rest, &uv);
+            chart.uv = uv;
+            rungs.take(Rung::Straighten);
+        }
+    }
     Ok((chart, rungs))
 }
 
@@ -95,25 +114,4 @@ fn or_nothing<T>(result: Result<Option<T>, StretchError>) -> Result<Option<T>, C
         Err(StretchError::Cancelled(c)) => Err(c),
         Err(_) => Ok(None),
     }
-}
-
-/// The halves that the quads of a chart have by their other diagonal, of those that are convex on the surface and in the
-/// plane: rounding is to keep them.
-pub(super) fn convex_halves(chart: &Chart) -> Vec<[VertexId; 3]> {
-    let mesh = &chart.patch.mesh;
-    let is_positive = |t: &[VertexId; 3]| distortion::signed_double_area(t.map(|v| chart.uv[v.index()])) > 0.0;
-    Quad::all(mesh, &chart.patch.polygon)
-        .map(|quad| (quad, quad.other_halves(mesh)))
-        .filter(|(quad, halves)| halves.iter().all(is_positive) && quad.is_convex(mesh))
-        .flat_map(|(_, halves)| halves)
-        .collect()
-}
-
-/// What the user is told of quads that are left bent.
-pub(super) fn warning(count: usize) -> String {
-    let (quads, are) = if count == 1 { ("quad", "is") } else { ("quads", "are") };
-    format!(
-        "{count} {quads} that {are} convex on the surface {are} bent in UV: by the other diagonal, which a game engine or a \
-         subdivision may take, a triangle there is flipped; triangulate such faces before"
-    )
 }
