@@ -207,7 +207,7 @@ def test_core_layers():
 CUTTING = [
     {"charted", "rigid_motion", "measured"},
     {"state", "edit", "cost"},
-    {"border", "history", "copied"},
+    {"border", "history", "copied", "touch_up"},
     {"moves/mod"},
     {"moves/split", "moves/dart", "moves/net"},
     {"attempt"},

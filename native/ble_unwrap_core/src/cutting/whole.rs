@@ -5,7 +5,7 @@ use crate::charts::{Chart, Patch};
 use crate::flattening::Rungs;
 use crate::mesh::{FaceId, HalfedgeId};
 use crate::progress::Cancelled;
-use crate::settings::{LimitOver, Moves, Settings};
+use crate::settings::{Moves, Settings};
 
 use super::cost::Price;
 use super::divide::{self, Charting};
@@ -76,8 +76,7 @@ impl Whole<'_> {
         self.search(charts, &[&PartialJoin::Longest], settings, rungs, run)
     }
 
-    /// Closes cuts of charts of this mesh from their ends on, if all moves are wanted. Not where the limit is over the atlas: what it
-    /// leaves is for joining charts.
+    /// Closes cuts of charts of this mesh from their ends on, if all moves are wanted.
     pub(super) fn close(
         &self,
         charts: Vec<Chart>,
@@ -85,9 +84,6 @@ impl Whole<'_> {
         rungs: &mut Rungs,
         run: &Run<'_>,
     ) -> Result<Vec<Chart>, Cancelled> {
-        if settings.limit_over == LimitOver::Atlas {
-            return Ok(charts);
-        }
         self.search(charts, &[&Zip { limit: settings.stretch_limit }], settings, rungs, run)
     }
 

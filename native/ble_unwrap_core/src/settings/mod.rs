@@ -125,7 +125,7 @@ choices!(Symmetry {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Style {
-    /// Each connected piece by what it is: manufactured where most of it unrolls between hard edges.
+    /// Of each connected piece what it shows: all that unrolls where most of it does, else large planes.
     Auto,
     /// Grown: hard edges are places like others.
     Organic,
@@ -134,7 +134,7 @@ pub enum Style {
 }
 
 choices!(Style {
-    Auto: "auto", "Auto", "Each connected piece by what it is.";
+    Auto: "auto", "Auto", "Of each connected piece all that unrolls where most of it does, else large planes.";
     Organic: "organic", "Organic", "Hard edges are places like others.";
     Hard: "hard", "Hard Surface", "All that unrolls between hard edges keeps its shape, and they count from a lower angle on.";
 });
