@@ -15,8 +15,8 @@ const HARD_OF_MANUFACTURED: f64 = 40.0;
 /// be the apex of a cone. A spherical cap of so much curvature, which ends 23° from its pole, has an L2 stretch of 1.0001 in the plane,
 /// and one that ends at 40° has 1.0008.
 const MOST_CURVED: f64 = 0.5;
-/// Parts of fewer triangles say nothing of what a thing is: they may be the facets of a crystal or of crumpled paper, and distances tell better
-/// which of them belong together.
+/// Parts have so many triangles in the mean. With fewer they are the facets of a crystal or of crumpled paper, and distances tell better which
+/// of them belong together.
 const LEAST_FACES: usize = 6;
 /// A thing is manufactured if parts that unroll have at least this share of its area; then all of them are kept. With a half in its place a
 /// table with barrels and bottles on it has 1.7 times as much seam, and a fan disk 1.4 times.
@@ -45,19 +45,16 @@ pub(crate) fn unrolling_parts(mesh: &TriMesh, polygon: &[u32], is_manufactured: 
     }
     let areas = measure::face_areas(mesh);
     let mut area = vec![0.0; parts];
-    let mut faces = vec![0; parts];
-    for (a, p) in areas.iter().zip(&part) {
-        area[*p as usize] += a;
-        faces[*p as usize] += 1;
-    }
+    areas.iter().zip(&part).for_each(|(a, p)| area[*p as usize] += a);
     let total: f64 = area.iter().sum();
     let unrolls = unrolling(mesh, &part, parts);
-    let large = (0..parts).filter(|&p| unrolls[p] && faces[p] >= LEAST_FACES);
-    let is_taken: Vec<bool> = if is_manufactured || large.map(|p| area[p]).sum::<f64>() >= LEAST_SHARE * total {
+    let unrolled: f64 = (0..parts).filter(|&p| unrolls[p]).map(|p| area[p]).sum();
+    let are_parts = parts * LEAST_FACES <= mesh.face_count() && unrolled >= LEAST_SHARE * total && total > 0.0;
+    let is_taken: Vec<bool> = if is_manufactured || are_parts {
         unrolls
     } else {
         let is_plane = plane(&normals, &areas, &part, parts);
-        (0..parts).map(|p| is_plane[p] && area[p] >= LEAST_PLANE * total).collect()
+        (0..parts).map(|p| is_plane[p] && area[p] >= LEAST_PLANE * total && total > 0.0).collect()
     };
     if !is_taken.contains(&true) {
         return Vec::new();
