@@ -216,7 +216,7 @@ CUTTING = [
     {"moves/join", "moves/partial_join", "moves/hand_over", "moves/across", "moves/zip"},
     {"whole", "atlas_limit"},
     {"level/carry", "level/prolong", "level/mod"},
-    {"symmetric", "twins"},
+    {"symmetric", "alike"},
     {"component"},
     {"mod"},
 ]

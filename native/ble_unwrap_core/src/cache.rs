@@ -103,13 +103,13 @@ impl Fingerprint {
         }
     }
 
-    /// Positions, triangles, how they are glued, where borders are liked, and which parts are not to be bent.
+    /// Positions, triangles, how they are glued, where seams weigh how much, and which parts are not to be bent.
     pub(crate) fn mesh(&mut self, mesh: &TriMesh) {
         self.reals(mesh.positions().iter().flat_map(|p| [p.x, p.y, p.z]));
         self.indices(mesh.triangles().iter().flatten().map(|v| v.index()));
         self.indices(mesh.halfedges().map(|h| 2 * mesh.twin(h).index() + usize::from(mesh.is_guide(h))));
         let vertices: Vec<VertexId> = mesh.vertices().collect();
-        self.reals(mesh.dislike_of(&vertices).into_iter().map(f64::from));
+        self.reals(mesh.seam_weights_of(&vertices).into_iter().map(f64::from));
         self.indices(mesh.faces().map(|f| mesh.part(f) as usize));
     }
 

@@ -41,8 +41,7 @@ pub(crate) fn of_vertices(
     progress: &Progress,
 ) -> Result<Vec<f32>, Cancelled> {
     let Some(scene) = Scene::new(mesh, positions, progress)? else { return Ok(vec![1.0; mesh.vertex_count()]) };
-    let sample = Sample::new(mesh);
-    progress.check()?;
+    let sample = Sample::new(mesh, progress)?;
     let traced: Vec<Result<Vec<f32>, Cancelled>> = sample
         .vertices
         .par_chunks(TOGETHER)
@@ -55,7 +54,7 @@ pub(crate) fn of_vertices(
     for chunk in traced {
         of_sample.extend(chunk?);
     }
-    Ok(sample.spread(mesh, &of_sample))
+    sample.spread(mesh, &of_sample, progress)
 }
 
 /// Visibilities for one who looks from a direction most of the time: as they are where the surface faces that way, two thirds where it faces
@@ -184,7 +183,7 @@ struct Sample {
 }
 
 impl Sample {
-    fn new(mesh: &TriMesh) -> Self {
+    fn new(mesh: &TriMesh, progress: &Progress) -> Result<Self, Cancelled> {
         let count = mesh.vertex_count();
         // A vertex of a triangle mesh has about 3r² others within r edges.
         let apart = (0..).find(|r| count <= SAMPLES * (1 + r * r)).unwrap_or(0);
@@ -194,6 +193,7 @@ impl Sample {
             if near[v.index()] != u32::MAX {
                 continue;
             }
+            progress.check()?;
             let number = vertices.len() as u32;
             vertices.push(v);
             near[v.index()] = number;
@@ -213,13 +213,14 @@ impl Sample {
                 first = last;
             }
         }
-        Self { vertices, near, apart }
+        Ok(Self { vertices, near, apart })
     }
 
     /// Values of the sample on all vertices, smoothed as widely as the sample is apart.
-    fn spread(&self, mesh: &TriMesh, of_sample: &[f32]) -> Vec<f32> {
+    fn spread(&self, mesh: &TriMesh, of_sample: &[f32], progress: &Progress) -> Result<Vec<f32>, Cancelled> {
         let mut values: Vec<f32> = self.near.iter().map(|&i| of_sample[i as usize]).collect();
         for _ in 0..=self.apart {
+            progress.check()?;
             let smooth = |v: VertexId| {
                 let (sum, count) =
                     mesh.neighbours(v).fold((values[v.index()], 1.0), |(s, n), w| (s + values[w.index()], n + 1.0));
@@ -227,7 +228,7 @@ impl Sample {
             };
             values = mesh.vertices().map(smooth).collect();
         }
-        values
+        Ok(values)
     }
 }
 
@@ -291,7 +292,7 @@ mod tests {
     #[test]
     fn large_meshes_are_sampled_and_values_spread_between() {
         let torus = test_surfaces::torus(160, 80, 0.4);
-        let sample = Sample::new(&torus);
+        let sample = Sample::new(&torus, &Progress::new()).expect("not cancelled");
         assert!(
             sample.apart > 0 && sample.vertices.len() < 2 * SAMPLES && sample.vertices.len() > SAMPLES / 3,
             "{}",

@@ -11,7 +11,7 @@ use crate::progress::Cancelled;
 use crate::segmentation::SpectralAnalysis;
 use crate::settings::{Holes, Moves, Settings};
 
-use super::cost;
+use super::cost::{self, CutPrice};
 use super::measured::{Measured, analyse};
 use super::moves::dart::Bulging;
 use super::moves::{net, split};
@@ -43,8 +43,8 @@ pub(super) fn embedded(
     rungs: &mut Rungs,
     run: &Run<'_>,
 ) -> Result<Option<Chart>, Cancelled> {
-    let (distances, _) = &*analyse(patch, settings, run)?;
-    Ok(match flattening::flatten(patch, distances, settings, rungs, run)? {
+    let measured = Measured::new(patch, None, settings, run);
+    Ok(match Attempt::new(&measured, settings, run).embedded(patch, rungs)? {
         Flattened::Flat(flat) => Some(flat.into_chart(patch.clone())),
         Flattened::Near(_) | Flattened::Refused => None,
     })
@@ -115,7 +115,7 @@ impl<'a> Attempt<'a> {
             return Ok(None);
         }
         if self.topology.genus() > 0 && self.settings.holes == Holes::Keep {
-            let length = |h| cost::of_cut(&patch.mesh, h);
+            let length = |h| CutPrice::new(self.settings).of(&patch.mesh, h);
             let open = patch.cut(&charts::cut_open(&patch.mesh, length, |h| patch.is_diagonal(h)));
             let is_disk = open.mesh.topology().is_disk();
             let chart = self.run_cut(open, rungs)?;
@@ -166,7 +166,7 @@ impl<'a> Attempt<'a> {
 
     fn cut_to_disk(&self) -> Patch {
         let patch = self.patch();
-        let length = |h| cost::of_cut(&patch.mesh, h);
+        let length = |h| CutPrice::new(self.settings).of(&patch.mesh, h);
         patch.cut(&charts::cut_to_disk(&patch.mesh, length, |h| patch.is_diagonal(h)))
     }
 
@@ -196,7 +196,7 @@ impl<'a> Attempt<'a> {
         }
     }
 
-    /// A patch other than the whole, embedded by distances of its own.
+    /// A patch embedded by distances of its own.
     fn embedded(&self, patch: &Patch, rungs: &mut Rungs) -> Result<Flattened, Cancelled> {
         let known = analyse(patch, self.settings, self.run)?;
         self.flatten(patch, &known.0, &known.1, rungs)
@@ -204,11 +204,7 @@ impl<'a> Attempt<'a> {
 
     /// How a patch bulges, for darts; `None` if none are wanted, or where that cannot be told.
     fn bulging<'p>(&'p self, patch: Cow<'p, Patch>) -> Result<Option<Bulging<'p>>, Cancelled> {
-        if self.settings.moves == Moves::All {
-            Bulging::of(patch, self.settings.stretch_limit, self.run)
-        } else {
-            Ok(None)
-        }
+        if self.settings.moves == Moves::All { Bulging::of(patch, self.settings, self.run) } else { Ok(None) }
     }
 
     /// A box or the like, unfolded.

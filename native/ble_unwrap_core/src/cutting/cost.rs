@@ -33,7 +33,7 @@ const BENDING: f64 = 5.0;
 const AT_REST: f64 = 1e-3;
 
 /// A seam that nobody can see counts for this share of its length: no seam is for nothing.
-const LEAST_DISLIKE: f64 = 0.1;
+const LEAST_WEIGHT: f64 = 0.1;
 /// What is glued of a border is at least so many times as long as the square root of the smaller chart's area: a chart that hangs on
 /// by less is no easier to paint than one by itself.
 pub(super) const LEAST_GLUED: f64 = 0.2;
@@ -62,7 +62,7 @@ pub(super) fn weighed(
     visibility: &[f32],
     settings: &Settings,
 ) -> Arc<TriMesh> {
-    let mut dislike = vec![1.0; mesh.vertex_count()];
+    let mut seam_weight = vec![1.0; mesh.vertex_count()];
     let seen = |v: VertexId| f64::from(visibility[v.index()]).powf(settings.hide_seams);
     for faces in components.iter() {
         let (mut sum, mut total) = (0.0, 0.0);
@@ -76,12 +76,12 @@ pub(super) fn weighed(
         if mean > 0.0 {
             for v in faces.iter().flat_map(|f| mesh.triangle(*f)) {
                 #[expect(clippy::cast_possible_truncation, reason = "a weight needs no more digits")]
-                let weight = (seen(v) / mean).max(LEAST_DISLIKE) as f32;
-                dislike[v.index()] = weight;
+                let weight = (seen(v) / mean).max(LEAST_WEIGHT) as f32;
+                seam_weight[v.index()] = weight;
             }
         }
     }
-    Arc::new(TriMesh::clone(mesh).with_dislike(dislike))
+    Arc::new(TriMesh::clone(mesh).with_seam_weights(seam_weight))
 }
 
 /// The prices on one surface.
@@ -187,16 +187,33 @@ impl Price {
     }
 }
 
-/// What a cut along an edge costs beside others: its length, less where seams are liked, and less over a bend.
-pub(super) fn of_cut(mesh: &TriMesh, h: HalfedgeId) -> f64 {
-    let t = mesh.twin(h);
-    let bend = if t.is_none() {
-        0.0
-    } else {
+/// What a cut along an edge costs beside others, where it opens a patch: its length, less where seams weigh less, and less over a bend.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CutPrice {
+    /// How strongly cuts are drawn to bends.
+    bends: f64,
+}
+
+impl CutPrice {
+    /// Through a body of flat sides: half as much along an edge of a box as across its sides.
+    pub(super) const OF_NET: Self = Self { bends: 1.0 };
+
+    /// As strongly drawn to bends as borders are, but where stretch has no price, and short seams are all that is wanted: over 16 models seams
+    /// are 5 % shorter than without at the default price, and on closed organic meshes under tight limits 6 % longer without a price.
+    pub(super) fn new(settings: &Settings) -> Self {
+        Self { bends: if may_bend(settings.stretch_price) { 0.0 } else { settings.segmentation.crease_weight } }
+    }
+
+    /// With d = 1 − cos(dihedral), which is 1 at a right angle, length · weight / (1 + d)^bends.
+    pub(super) fn of(self, mesh: &TriMesh, h: HalfedgeId) -> f64 {
+        let t = mesh.twin(h);
+        let length = mesh.edge_length(h) * mesh.border_cost(h);
+        if t.is_none() || self.bends == 0.0 {
+            return length;
+        }
         let [m, n] = [h, t].map(|h| measure::triangle_normal(mesh.triangle_positions(h.face())));
-        (1.0 - m.dot(&n)).max(0.0)
-    };
-    mesh.edge_length(h) * mesh.border_cost(h) / (1.0 + bend)
+        length / (1.0 + (1.0 - m.dot(&n)).max(0.0)).powf(self.bends)
+    }
 }
 
 /// Whether a chart is as good as without stretch.
@@ -300,11 +317,11 @@ mod tests {
             assert!((cost(&mesh, |_| true) - 1.0).abs() < 0.05);
         }
         let steep = weighed_by(10.0);
-        assert!(steep.edges().all(|h| steep.border_cost(h) >= LEAST_DISLIKE - 1e-6), "no seam is for nothing");
+        assert!(steep.edges().all(|h| steep.border_cost(h) >= LEAST_WEIGHT - 1e-6), "no seam is for nothing");
         // A part of the mesh keeps the weights, as a coarse copy does.
         let faces: Vec<FaceId> = steep.faces().skip(5).step_by(2).collect();
         let (part, source) = steep.submesh(&faces, |_| false);
-        assert_eq!(part.dislike_of(&part.vertices().collect::<Vec<_>>()), steep.dislike_of(&source));
+        assert_eq!(part.seam_weights_of(&part.vertices().collect::<Vec<_>>()), steep.seam_weights_of(&source));
         let unseen = weighed(&mesh, &components, &vec![0.0; mesh.vertex_count()], &Settings::default());
         assert!(unseen.edges().all(|h| unseen.border_cost(h) == 1.0));
     }
@@ -416,9 +433,18 @@ mod tests {
             let side = cube.position(cube.to(h)) - cube.position(cube.from(h));
             side.iter().filter(|x| x.abs() > 0.5).count() == 1
         };
-        for h in cube.halfedges() {
-            let share = of_cut(&cube, h) / cube.edge_length(h);
-            assert!((share - if is_edge(h) { 0.5 } else { 1.0 }).abs() < 1e-9, "{share}");
+        let with = |stretch_price, crease_weight| {
+            let mut settings = Settings { stretch_price, ..Settings::default() };
+            settings.segmentation.crease_weight = crease_weight;
+            CutPrice::new(&settings)
+        };
+        for (cut, at_edge) in
+            [(CutPrice::OF_NET, 0.5), (with(20.0, 1.0), 0.5), (with(20.0, 2.0), 0.25), (with(0.0, 1.0), 1.0)]
+        {
+            for h in cube.halfedges() {
+                let share = cut.of(&cube, h) / cube.edge_length(h);
+                assert!((share - if is_edge(h) { at_edge } else { 1.0 }).abs() < 1e-9, "{share}");
+            }
         }
     }
 

@@ -5,6 +5,7 @@
 //! makes the edits that come to something. Charts come from patches that are [divided](mod@divide) until each can be
 //! flattened; on a large component this happens on a [coarse mesh](level) first.
 
+mod alike;
 mod atlas_limit;
 mod attempt;
 mod border;
@@ -24,7 +25,6 @@ mod state;
 mod symmetric;
 mod touch_up;
 mod trial;
-mod twins;
 mod whole;
 
 use std::cmp::Reverse;
@@ -42,10 +42,10 @@ use crate::progress::Cancelled;
 use crate::segmentation;
 use crate::settings::{ChartScale, LimitOver, Moves, Settings, Style};
 
+use alike::{Alike, Placed, alike};
 use atlas_limit::join_within_atlas;
 use charted::Charted;
 use moves::across::cut_across;
-use twins::{Placed, Twin, twins};
 
 pub(crate) use cost::Price;
 pub(crate) use divide::divide;
@@ -89,11 +89,11 @@ pub(crate) fn cut(
         }
         Placed { patch, positions: place }
     };
-    let twins = twins(components, &placed, settings, run.progress)?;
+    let likes = alike(components, &placed, settings, run.progress)?;
     // The largest first, so that no long one starts last.
     let mut order: Vec<usize> = (0..components.len()).collect();
     order.sort_by_key(|&component| Reverse(components.group(component).len()));
-    let (copies, originals): (Vec<usize>, Vec<usize>) = order.into_iter().partition(|&c| twins[c].is_some());
+    let (copies, originals): (Vec<usize>, Vec<usize>) = order.into_iter().partition(|&c| likes[c].is_some());
     let mut made: Vec<Option<Arc<Made>>> = vec![None; components.len()];
     let in_parallel = |which: Vec<usize>, of: &(dyn Fn(usize) -> Result<Arc<Made>, Cancelled> + Sync)| {
         let found: Vec<_> = which.into_par_iter().with_max_len(1).map(|component| (component, of(component))).collect();
@@ -105,14 +105,14 @@ pub(crate) fn cut(
     // A copy may be the original of its mirror image: round by round, and each round makes some.
     let mut open = copies;
     while !open.is_empty() {
-        let is_made = |twin: &Option<Twin>| twin.as_ref().is_none_or(|twin| made[twin.original].is_some());
-        let (ready, later): (Vec<usize>, Vec<usize>) = open.into_iter().partition(|&c| is_made(&twins[c]));
+        let is_made = |like: &Option<Alike>| like.as_ref().is_none_or(|like| made[like.original].is_some());
+        let (ready, later): (Vec<usize>, Vec<usize>) = open.into_iter().partition(|&c| is_made(&likes[c]));
         let copied = in_parallel(ready, &|component| {
             run.progress.check()?;
-            let original = twins[component].as_ref().and_then(|twin| Some((twin, made[twin.original].as_ref()?)));
-            let Some((twin, charts)) = original else { return of_component(component) };
-            let [there, here] = [twin.original, component].map(|c| (patch_of(c), components.group(c)));
-            let copied = twin.charts((&there.0, there.1), &charts.0, (&here.0, here.1), settings, run)?;
+            let original = likes[component].as_ref().and_then(|like| Some((like, made[like.original].as_ref()?)));
+            let Some((like, charts)) = original else { return of_component(component) };
+            let [there, here] = [like.original, component].map(|c| (patch_of(c), components.group(c)));
+            let copied = like.charts((&there.0, there.1), &charts.0, (&here.0, here.1), settings, run)?;
             let Some(copied) = copied else { return of_component(component) };
             charted.add(components.group(component).len() as f64, 1.0);
             Ok(Arc::new(copied))

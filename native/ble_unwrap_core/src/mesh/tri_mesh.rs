@@ -15,8 +15,8 @@ use super::index::{FaceId, HalfedgeId, VertexId};
 ///
 /// Not guaranteed: being connected, having a boundary, positive areas, distinct positions.
 ///
-/// Edges may be marked as guides, which the borders of charts should follow, and places may be more or less liked for borders; parts
-/// keep both.
+/// Edges may be marked as guides, which the borders of charts should follow, vertices have weights for the seams there, and faces may be in parts
+/// that keep their shape; parts of the mesh keep all this.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TriMesh {
     positions: Vec<Point3<f64>>,
@@ -27,7 +27,7 @@ pub(crate) struct TriMesh {
     /// Whether a half-edge lies on a guide; empty where none does.
     guide: Vec<bool>,
     /// What a border at each vertex counts for its length; empty where that is 1 everywhere.
-    dislike: Vec<f32>,
+    seam_weight: Vec<f32>,
     /// The part between hard edges that each face is in, from 1 on, and 0 for none; empty where all are in none.
     part: Vec<u32>,
 }
@@ -136,7 +136,7 @@ impl TriMesh {
         let positions = source.iter().map(|&s| position(s)).collect();
         let triangles = corner_vertex.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
         (
-            Self { positions, triangles, twin, outgoing, guide: Vec::new(), dislike: Vec::new(), part: Vec::new() },
+            Self { positions, triangles, twin, outgoing, guide: Vec::new(), seam_weight: Vec::new(), part: Vec::new() },
             source,
         )
     }
@@ -232,9 +232,9 @@ impl TriMesh {
         }
         let (mesh, source) = Self::from_glued(&corner_source, twin, |s| self.positions[s as usize]);
         let source: Vec<VertexId> = source.into_iter().map(|s| VertexId::new(s as usize)).collect();
-        let dislike = self.dislike_of(&source);
+        let seam_weight = self.seam_weights_of(&source);
         let part = if self.part.is_empty() { Vec::new() } else { faces.iter().map(|&f| self.part(f)).collect() };
-        (mesh.with_guides(guide).with_dislike(dislike).with_parts(part), source)
+        (mesh.with_guides(guide).with_seam_weights(seam_weight).with_parts(part), source)
     }
 
     /// Number of vertices.
@@ -390,14 +390,18 @@ impl TriMesh {
     /// # Panics
     /// If there is neither a number for each vertex nor none at all.
     #[must_use]
-    pub(crate) fn with_dislike(self, dislike: Vec<f32>) -> Self {
-        assert!(dislike.is_empty() || dislike.len() == self.positions.len(), "one number a vertex");
-        Self { dislike, ..self }
+    pub(crate) fn with_seam_weights(self, seam_weight: Vec<f32>) -> Self {
+        assert!(seam_weight.is_empty() || seam_weight.len() == self.positions.len(), "one number a vertex");
+        Self { seam_weight, ..self }
     }
 
     /// What a border counts for its length at some vertices, for a mesh made of them.
-    pub(crate) fn dislike_of(&self, vertices: &[VertexId]) -> Vec<f32> {
-        if self.dislike.is_empty() { Vec::new() } else { vertices.iter().map(|v| self.dislike[v.index()]).collect() }
+    pub(crate) fn seam_weights_of(&self, vertices: &[VertexId]) -> Vec<f32> {
+        if self.seam_weight.is_empty() {
+            Vec::new()
+        } else {
+            vertices.iter().map(|v| self.seam_weight[v.index()]).collect()
+        }
     }
 
     /// The same mesh with the part between hard edges that each face is in, or nothing where there are none.
@@ -418,12 +422,12 @@ impl TriMesh {
     }
 
     /// What a border along an edge costs beside one of the same length at a place of the usual kind: less on a guide, and less where
-    /// borders are liked.
+    /// seams weigh less.
     #[inline]
     #[must_use]
     pub(crate) fn border_cost(&self, h: HalfedgeId) -> f64 {
         let guide = if self.is_guide(h) { GUIDE_COST } else { 1.0 };
-        let at = |v: VertexId| self.dislike.get(v.index()).map_or(1.0, |&dislike| f64::from(dislike));
+        let at = |v: VertexId| self.seam_weight.get(v.index()).map_or(1.0, |&seam_weight| f64::from(seam_weight));
         guide * 0.5 * (at(self.from(h)) + at(self.to(h)))
     }
 

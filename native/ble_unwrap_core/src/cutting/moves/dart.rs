@@ -12,11 +12,12 @@ use nalgebra::Point2;
 use crate::cache::{Kind, Run};
 use crate::charts::{self, Patch};
 use crate::distortion::RestTriangle;
-use crate::mesh::{HalfedgeId, VertexId};
+use crate::mesh::VertexId;
 use crate::progress::Cancelled;
+use crate::settings::Settings;
 use crate::stretch::{self, Bulge, StretchError};
 
-use super::super::cost;
+use super::super::cost::CutPrice;
 
 /// A patch is promising if its conformal map has at most so many times the stretch above 1 that the limit allows; the map of
 /// least stretch has far less, as it need not keep angles. A dart too many is closed again, one too few makes a split of it: over
@@ -34,16 +35,17 @@ pub(crate) struct Bulging<'a> {
     patch: Cow<'a, Patch>,
     bulge: Arc<Bulge>,
     most: f64,
+    cut: CutPrice,
     run: &'a Run<'a>,
 }
 
 impl<'a> Bulging<'a> {
     /// `None` where that cannot be told.
-    pub(crate) fn of(patch: Cow<'a, Patch>, stretch_limit: f64, run: &'a Run<'a>) -> Result<Option<Self>, Cancelled> {
-        Self::new(patch, 1.0 + PROMISING * (stretch_limit - 1.0), run)
+    pub(crate) fn of(patch: Cow<'a, Patch>, settings: &Settings, run: &'a Run<'a>) -> Result<Option<Self>, Cancelled> {
+        Self::new(patch, 1.0 + PROMISING * (settings.stretch_limit - 1.0), CutPrice::new(settings), run)
     }
 
-    fn new(patch: Cow<'a, Patch>, most: f64, run: &'a Run<'a>) -> Result<Option<Self>, Cancelled> {
+    fn new(patch: Cow<'a, Patch>, most: f64, cut: CutPrice, run: &'a Run<'a>) -> Result<Option<Self>, Cancelled> {
         let mesh = &patch.mesh;
         let known = run.recall(
             Kind::Bulge,
@@ -52,7 +54,7 @@ impl<'a> Bulging<'a> {
             || stretch::bulge(mesh, &RestTriangle::of_mesh(mesh)),
         );
         match known {
-            Ok(bulge) => Ok(Some(Self { patch, bulge, most, run })),
+            Ok(bulge) => Ok(Some(Self { patch, bulge, most, cut, run })),
             Err(StretchError::Cancelled(c)) => Err(c),
             Err(_) => Ok(None),
         }
@@ -72,7 +74,9 @@ impl<'a> Bulging<'a> {
         let mut bulging = self;
         for _ in 0..MOST_DARTS {
             let Some(open) = bulging.with_dart() else { return Ok(None) };
-            let Some(next) = Self::new(Cow::Owned(open), bulging.most, bulging.run)? else { return Ok(None) };
+            let Some(next) = Self::new(Cow::Owned(open), bulging.most, bulging.cut, bulging.run)? else {
+                return Ok(None);
+            };
             bulging = next;
             if bulging.is_promising() {
                 return Ok(Some(bulging.patch.into_owned()));
@@ -90,7 +94,7 @@ impl<'a> Bulging<'a> {
 
     /// The patch cut from its tip to the boundary, or on a closed surface to its root.
     fn with_dart(&self) -> Option<Patch> {
-        cut_to(&self.patch, self.bulge.enclosed.or(self.bulge.tip)?, self.bulge.root)
+        cut_to(&self.patch, self.bulge.enclosed.or(self.bulge.tip)?, self.bulge.root, self.cut)
     }
 }
 
@@ -98,7 +102,11 @@ impl<'a> Bulging<'a> {
 pub(crate) fn without_doubled_edges(patch: Patch, uv: Vec<Point2<f64>>) -> (Patch, Vec<Point2<f64>>) {
     let (mut patch, mut uv) = (patch, uv);
     for _ in 0..MOST_DOUBLED {
-        let Some(open) = stretch::enclosed_vertex(&patch.mesh).and_then(|tip| cut_to(&patch, tip, None)) else { break };
+        let Some(open) =
+            stretch::enclosed_vertex(&patch.mesh).and_then(|tip| cut_to(&patch, tip, None, CutPrice::OF_NET))
+        else {
+            break;
+        };
         uv = carried(&uv, &patch, &open);
         patch = open;
     }
@@ -120,11 +128,10 @@ pub(super) fn is_guided(patch: &Patch) -> bool {
     mesh.has_guides() && mesh.edges().any(|h| mesh.is_guide(h) && !mesh.is_boundary(h))
 }
 
-/// A patch cut from an inner vertex to the boundary, or on a closed surface to its root.
-pub(super) fn cut_to(patch: &Patch, tip: VertexId, root: Option<VertexId>) -> Option<Patch> {
+/// A patch cut from an inner vertex to the boundary, or on a closed surface to its root, where that costs least.
+pub(super) fn cut_to(patch: &Patch, tip: VertexId, root: Option<VertexId>, cut: CutPrice) -> Option<Patch> {
     let mesh = &patch.mesh;
-    let length = |h: HalfedgeId| cost::of_cut(mesh, h);
-    let dart = charts::shortest_path_to_boundary(mesh, tip, root, length, |h| patch.is_diagonal(h))?;
+    let dart = charts::shortest_path_to_boundary(mesh, tip, root, |h| cut.of(mesh, h), |h| patch.is_diagonal(h))?;
     // One edge of a closed surface, cut, opens nothing.
     let least = if root.is_some() { 2 } else { 1 };
     (dart.len() >= least).then(|| patch.cut(&dart))
@@ -153,7 +160,8 @@ pub(super) mod tests {
     fn of<T>(patch: &Patch, stretch_limit: f64, then: impl FnOnce(Bulging<'_>) -> T) -> T {
         let progress = Progress::new();
         let run = Run::new(&progress, None);
-        then(Bulging::of(Cow::Borrowed(patch), stretch_limit, &run).expect("memory").expect("factored"))
+        let settings = Settings { stretch_limit, ..Settings::default() };
+        then(Bulging::of(Cow::Borrowed(patch), &settings, &run).expect("memory").expect("factored"))
     }
 
     #[test]

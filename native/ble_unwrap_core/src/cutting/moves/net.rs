@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use crate::charts::Patch;
 use crate::stretch;
 
+use super::super::cost::CutPrice;
 use super::dart::{cut_to, is_guided};
 
 /// A patch with more corners has no net: a box has eight.
@@ -26,7 +27,7 @@ pub(crate) fn net(patch: &Patch) -> Option<Patch> {
         if tips.peek().is_none() {
             return if let Cow::Owned(net) = net { Some(net) } else { None };
         }
-        net = Cow::Owned(tips.find_map(|tip| cut_to(&net, tip, root))?);
+        net = Cow::Owned(tips.find_map(|tip| cut_to(&net, tip, root, CutPrice::OF_NET))?);
     }
     None
 }

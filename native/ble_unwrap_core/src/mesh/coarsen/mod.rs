@@ -58,7 +58,7 @@ pub(crate) fn coarsen(mesh: &TriMesh, target_vertices: usize, progress: &Progres
         number[v.index()] = VertexId::new(i);
     }
     let vertex: Vec<VertexId> = collapsing.roots().iter().map(|root| number[root.index()]).collect();
-    let coarse = guides::carried_over(mesh, coarse, &vertex).with_dislike(mesh.dislike_of(&source));
+    let coarse = guides::carried_over(mesh, coarse, &vertex).with_seam_weights(mesh.seam_weights_of(&source));
     let face = nearest_or_same(mesh, &coarse, &vertex, collapsing.removed().is_empty(), progress)?;
     Ok(Coarse { mesh: coarse, vertex, source, face })
 }

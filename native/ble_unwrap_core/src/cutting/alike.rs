@@ -27,8 +27,8 @@ const MOST_PLANES: usize = 5;
 const MISPLACED: f64 = 0.1;
 
 /// A component that is like another one.
-pub(super) struct Twin {
-    /// The other: like none before it, or itself a twin whose mirror image this one is.
+pub(super) struct Alike {
+    /// The other: like none before it, or itself like one, and the one whose mirror image this one is.
     pub(super) original: usize,
     /// Of the original to this one.
     likeness: Likeness,
@@ -45,16 +45,16 @@ pub(super) struct Placed {
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
-pub(super) fn twins(
+pub(super) fn alike(
     components: &Groups<FaceId>,
     placed: &(impl Fn(usize) -> Placed + Sync),
     settings: &Settings,
     progress: &Progress,
-) -> Result<Vec<Option<Twin>>, Cancelled> {
-    let mut twins: Vec<Option<Twin>> = (0..components.len()).map(|_| None).collect();
+) -> Result<Vec<Option<Alike>>, Cancelled> {
+    let mut likes: Vec<Option<Alike>> = (0..components.len()).map(|_| None).collect();
     // Under a limit over the atlas charts of different components share it, and the paper knows of no copies.
     if settings.moves < Moves::All || settings.limit_over == LimitOver::Atlas {
-        return Ok(twins);
+        return Ok(likes);
     }
     let mut by_size: HashMap<usize, Vec<usize>> = HashMap::new();
     for component in (0..components.len()).filter(|&c| components.group(c).len() >= LEAST_FACES) {
@@ -62,17 +62,17 @@ pub(super) fn twins(
     }
     let groups: Vec<Vec<usize>> = by_size.into_values().filter(|group| group.len() > 1).collect();
     if groups.is_empty() {
-        return Ok(twins);
+        return Ok(likes);
     }
     let plane = if settings.symmetry == Symmetry::Auto { plane(components, placed, progress)? } else { None };
-    let found: Vec<Result<Vec<(usize, Twin)>, Cancelled>> =
-        groups.par_iter().map(|group| twins_among(group, placed, plane.as_ref(), progress)).collect();
+    let found: Vec<Result<Vec<(usize, Alike)>, Cancelled>> =
+        groups.par_iter().map(|group| alike_among(group, placed, plane.as_ref(), progress)).collect();
     for group in found {
-        for (component, twin) in group? {
-            twins[component] = Some(twin);
+        for (component, like) in group? {
+            likes[component] = Some(like);
         }
     }
-    Ok(twins)
+    Ok(likes)
 }
 
 /// The mirror plane of the largest component that has one, of a few.
@@ -93,16 +93,16 @@ fn plane(
     Ok(None)
 }
 
-/// Twins among components of the same number of faces, ascending.
-fn twins_among(
+/// Those that are alike among components of the same number of faces, ascending.
+fn alike_among(
     group: &[usize],
     placed: &impl Fn(usize) -> Placed,
     plane: Option<&Plane>,
     progress: &Progress,
-) -> Result<Vec<(usize, Twin)>, Cancelled> {
+) -> Result<Vec<(usize, Alike)>, Cancelled> {
     let mut originals: Vec<(usize, Placed)> = Vec::new();
     let mut middles: Vec<(usize, Point3<f64>)> = Vec::new();
-    let mut twins = Vec::new();
+    let mut likes = Vec::new();
     for &component in group {
         let own = placed(component);
         let mut found = None;
@@ -113,7 +113,7 @@ fn twins_among(
             let partner = middles.iter().find(|other| (other.1 - image).norm() <= most);
             if let Some(&(original, _)) = partner {
                 let likeness = likeness_in(plane, &placed(original), &own, progress)?;
-                found = likeness.map(|likeness| Twin { original, likeness });
+                found = likeness.map(|likeness| Alike { original, likeness });
             }
             middles.push((component, middle));
         }
@@ -121,15 +121,15 @@ fn twins_among(
             if found.is_some() {
                 break;
             }
-            found = likeness(other, &own, progress)?.map(|likeness| Twin { original: *original, likeness });
+            found = likeness(other, &own, progress)?.map(|likeness| Alike { original: *original, likeness });
         }
         match found {
-            Some(twin) => twins.push((component, twin)),
+            Some(like) => likes.push((component, like)),
             None if originals.len() < MOST_COMPARED => originals.push((component, own)),
             None => (),
         }
     }
-    Ok(twins)
+    Ok(likes)
 }
 
 /// The likeness of a component to another that is its mirror image in a plane, where both are.
@@ -179,7 +179,7 @@ impl Placed {
     }
 }
 
-impl Twin {
+impl Alike {
     /// Copies of the original's charts. Each component comes as a patch of itself with the names of its faces on the surface, ascending, by
     /// which those of the charts go. `None` where a chart does not lie on this component as well.
     pub(super) fn charts(
