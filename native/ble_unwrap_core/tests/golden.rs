@@ -46,7 +46,7 @@ static ROWS: [Row; 17] = [
     row("capped cylinder", [3, 3], 1.0, 3.355, 0.475),
     row("cone", [1, 1], 1.0, 0.85, 0.54),
     row("torus", [1, 1], 1.0297, 1.692, 0.289),
-    row("plate with five holes", [7, 7], 1.0, 7.138, 0.523),
+    row("plate with five holes", [6, 6], 1.0, 6.083, 0.672),
     row("Moebius strip", [2, 2], 1.0, 0.617, 0.548),
     row("Klein bottle", [1, 1], 1.0251, 2.011, 0.571),
     row("face", [1, 1], 1.0063, 0.777, 0.570),

@@ -443,5 +443,5 @@ pub static TABLE: &[Setting] = &[
         "Width and height, in texels, of the texture that the UVs are meant for: its proportions and, for the margin, its \
          resolution."),
     row("rotation", "Rotation", Group::Packing, Kind::Choice(|s| &mut s.packing.rotation), "",
-        "How charts may be turned."),
+        "How charts may be turned when they are packed."),
 ];

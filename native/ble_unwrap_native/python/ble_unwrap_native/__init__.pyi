@@ -156,7 +156,7 @@ class _TextureGroup(TypedDict, total=False):
 @type_check_only
 class _PackingGroup(TypedDict, total=False):
     rotation: Literal["aligned", "any", "quarter", "none"]
-    """How charts may be turned to pack them tighter. "aligned": Charts with straight borders lie along the axes, symmetric ones upright or level, others at any angle. "any": Charts are turned by any angle, which packs tightest. "quarter": Charts are turned by multiples of 90° from how they were flattened, not set upright. "none": Charts stay as they were flattened, at whatever angle that is."""
+    """How charts may be turned when they are packed. "aligned": Charts with straight borders lie along the axes, symmetric ones upright or level, others at any angle. "any": Charts are turned by any angle, which packs tightest. "quarter": Charts are turned by multiples of 90° from how they were flattened, not set upright. "none": Charts stay as they were flattened, at whatever angle that is."""
 
 @type_check_only
 class _UnwrapSettings(
