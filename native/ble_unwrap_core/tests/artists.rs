@@ -286,6 +286,22 @@ fn a_barrel_is_a_rectangle_and_two_round_caps() {
     }
 }
 
+/// So many vertices that the wall is charted on a coarse mesh by itself, while its caps keep their edges.
+#[test]
+fn what_is_left_between_the_planes_of_a_large_thing_is_charted_by_itself() {
+    let profile: Vec<[f64; 2]> =
+        (-12..=12).map(|k| f64::from(k) / 12.0).map(|t| [1.0 - 0.25 * t * t, 1.25 * t]).collect();
+    let mesh = lathe(200, &profile);
+    let atlas = unwrapped(&mesh, &Settings::default());
+    assert_eq!(atlas.report.charts, 3);
+    assert!(count(&atlas, "prolonged") + count(&atlas, "mirrored") > 0, "by way of the coarse mesh");
+    let rim = seams(&mesh, &atlas).iter().filter(|edge| edge.iter().all(|v| *v < 200 || *v >= 24 * 200)).count();
+    assert_eq!(rim, 400, "all around both caps");
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    let again = alone.install(|| unwrapped(&mesh, &Settings::default()));
+    assert_eq!((atlas.uv, atlas.chart), (again.uv, again.chart));
+}
+
 #[test]
 fn a_machined_part_is_cut_at_its_hard_edges_and_nowhere_else() {
     for mesh in in_all_ways(&gear(12)) {

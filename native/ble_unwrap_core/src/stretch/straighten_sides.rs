@@ -20,8 +20,9 @@ const LEAST_ALIGNED: f64 = 0.25;
 const ALONG: f64 = 0.017;
 /// An edge that is across by no more is left to rounding.
 const EXACTLY: f64 = 1e-7;
-/// What the sides count for beside the stretch, one after the other.
-const WEIGHTS: [f64; 6] = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5];
+/// What the sides count for beside the stretch, one after the other. Six from 1 on, each ten times the one before, lead to the same maps in 1.4 times
+/// the time.
+const WEIGHTS: [f64; 2] = [1e2, 1e5];
 /// What the other halves of quads count: they are not to turn over, and no more.
 const HALVES_WEIGHT: f64 = 0.01;
 
