@@ -59,6 +59,17 @@ def _overlaps_text(measured):
     return f"{overlaps}, {f'{kept:,}' if kept else 'none'} with faces that were not unwrapped"
 
 
+def found(report):
+    """What was found on the meshes and made use of, a line each."""
+    rungs = report.get("rungs", {})
+    said = {
+        "mirrored": lambda count: f"{counted(count, 'mirrored piece')}: seams on one half are those of the other",
+        "copied": lambda count: f"{counted(count, 'piece')} mapped as another one like it",
+        "straighten": lambda count: f"{counted(count, 'chart')} with sides laid along the axes",
+    }
+    return [text(rungs[name]) for name, text in said.items() if rungs.get(name)]
+
+
 def lines(certificate, *, margin, stretch_limit, limit_over="CHART", notes=(), length_text="{:.4g}".format):
     """The certificate for display: (status, text), status one of OK, BAD, WARN, INFO.
 

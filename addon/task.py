@@ -150,6 +150,7 @@ class UnwrapTask:
                     "select those faces, too, turn on Keep Place, or pack all charts afterwards (UV > Pack Islands)"
                 )
         certificate = surface_report.certify(measured, margin=margin, warnings=warnings, **limit)
+        notes = [*self.notes, *surface_report.found(result.report)]
         seconds = self.timer.seconds()
         return Outcome(
             title=self.selection.title,
@@ -157,9 +158,7 @@ class UnwrapTask:
             report=result.report,
             seconds=seconds,
             summary=surface_report.summary(measured, seconds),
-            lines=surface_report.lines(
-                certificate, margin=margin, **limit, notes=self.notes, length_text=units.length_text
-            ),
+            lines=surface_report.lines(certificate, margin=margin, **limit, notes=notes, length_text=units.length_text),
             maps=mesh_bridge.active_maps(self.selection),
         )
 

@@ -187,6 +187,19 @@ def test_one_is_singular(addon):
     assert report.lines(certificate, margin=4, stretch_limit=1.1)[0] == ("INFO", "2 faces in 1,200 charts")
 
 
+def test_what_was_found_is_said(addon):
+    report = addon("surface_report")
+    assert report.found({"rungs": {"plane": 2}}) == report.found({}) == []
+    assert report.found({"rungs": {"mirrored": 1, "copied": 3, "straighten": 2}}) == [
+        "1 mirrored piece: seams on one half are those of the other",
+        "3 pieces mapped as another one like it",
+        "2 charts with sides laid along the axes",
+    ]
+    bpy.ops.mesh.primitive_monkey_add()
+    unwrap()
+    assert any("mirrored piece" in text for _, text in shown_lines())
+
+
 def book(name="Book", pages=3):
     """Sheets that share an edge: more than two faces have it."""
     positions = [(0, 0, 0), (0, 0, 1)]
