@@ -64,7 +64,7 @@ def found(report):
     rungs = report.get("rungs", {})
     said = {
         "mirrored": lambda count: f"{counted(count, 'mirrored piece')}: seams on one half are those of the other",
-        "copied": lambda count: f"{counted(count, 'piece')} mapped as another one like it",
+        "copied": lambda count: f"{counted(count, 'piece')} with the map of another one like them",
         "straighten": lambda count: f"{counted(count, 'chart')} with sides laid along the axes",
     }
     return [text(rungs[name]) for name, text in said.items() if rungs.get(name)]

@@ -192,7 +192,7 @@ def test_what_was_found_is_said(addon):
     assert report.found({"rungs": {"plane": 2}}) == report.found({}) == []
     assert report.found({"rungs": {"mirrored": 1, "copied": 3, "straighten": 2}}) == [
         "1 mirrored piece: seams on one half are those of the other",
-        "3 pieces mapped as another one like it",
+        "3 pieces with the map of another one like them",
         "2 charts with sides laid along the axes",
     ]
     bpy.ops.mesh.primitive_monkey_add()

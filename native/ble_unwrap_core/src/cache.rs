@@ -24,8 +24,10 @@ const LEAST_BYTES: usize = 64 << 20;
 pub(crate) enum Kind {
     /// How far vertices can be seen.
     Visibility,
-    /// The charts of a component.
+    /// The charts of a component as they were found.
     Charts,
+    /// The charts of a component, touched up.
+    TouchedUp,
     /// A coarse mesh.
     Coarse,
     /// Distances on a patch and their spectral analysis.

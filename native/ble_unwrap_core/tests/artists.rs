@@ -278,7 +278,7 @@ fn a_barrel_is_a_rectangle_and_two_round_caps() {
             let atlas = unwrapped(&mesh, &Settings::default());
             assert!([1, 3].contains(&atlas.report.charts), "the caps are apart, or hang on by an edge");
             assert!(atlas.report.l2 < 1.006, "{}", atlas.report.l2);
-            // Two of the wall's sides are as long as the caps are round, twice in all: once on the wall, once on the cap.
+            // The outline of each cap is border twice: straight on the wall, round on the cap.
             assert!(aligned_share(&mesh, &atlas) > 0.6, "{}", aligned_share(&mesh, &atlas));
             let left = unwrapped(&mesh, &Settings { straighten: 0.0, ..Settings::default() });
             assert!(left.report.l2 < atlas.report.l2 && aligned_share(&mesh, &left) < 0.5);

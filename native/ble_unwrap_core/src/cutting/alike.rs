@@ -28,7 +28,7 @@ const MISPLACED: f64 = 0.1;
 
 /// A component that is like another one.
 pub(super) struct Alike {
-    /// The other: like none before it, or itself like one, and the one whose mirror image this one is.
+    /// The other: one that is charted itself, or a copy, of which this one is the mirror image.
     pub(super) original: usize,
     /// Of the original to this one.
     likeness: Likeness,

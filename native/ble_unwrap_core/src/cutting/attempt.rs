@@ -8,13 +8,13 @@ use crate::flattening::{self, Flattened, Positions, Rung, Rungs};
 use crate::geodesics::LandmarkDistances;
 use crate::mesh::Topology;
 use crate::progress::Cancelled;
-use crate::segmentation::SpectralAnalysis;
+use crate::segmentation::{self, SpectralAnalysis};
 use crate::settings::{Holes, Moves, Settings};
 
 use super::cost::{self, CutPrice};
 use super::measured::{Measured, analyse};
 use super::moves::dart::Bulging;
-use super::moves::{net, split};
+use super::moves::net;
 
 /// Patches less planar than this are split before any flattening. Far below what the embedding alone would
 /// need (a cap of 100° has 0.79): stretch minimisation brings patches of 0.66 under an L2 of 1.1, and on
@@ -101,8 +101,8 @@ impl<'a> Attempt<'a> {
         if let Some(chart) = self.without_stretch(rungs) {
             return Ok(Some(chart));
         }
-        // What unrolls in parts is not bent.
-        if !cost::may_bend(self.settings.stretch_price) && split::hard_parts(patch).is_some() {
+        // A patch with parts between hard edges is divided there, not bent as a whole.
+        if !cost::may_bend(self.settings.stretch_price) && segmentation::between_parts(&patch.mesh).is_some() {
             return Ok(None);
         }
         if may_be_chart || is_closed {

@@ -38,8 +38,8 @@ pub(crate) fn charts(
     let size = faces.len() as f64;
     let mut rungs = Rungs::default();
     let is_large = is_large(whole, settings);
-    let parts = split::hard_parts(whole);
-    let all_unroll = parts.is_some() && whole.mesh.faces().all(|f| whole.mesh.part(f) != 0);
+    let parts = if is_large || whole.mesh.is_all_parts() { split::hard_parts(whole) } else { None };
+    let all_unroll = parts.is_some() && whole.mesh.is_all_parts();
     if !all_unroll && let Some(mirror) = symmetric::mirror(whole, is_large, settings, run)? {
         let of_half = |half: &Patch, faces: &[FaceId], once: &Settings| charts(half, faces, once, charted, run);
         if let Some((mut charts, rungs)) = symmetric::charts(whole, &mirror, is_large, settings, &of_half, run)? {
@@ -87,9 +87,8 @@ fn by_parts(
     charted: &Charted<'_>,
     run: &Run<'_>,
 ) -> Result<Charting, Cancelled> {
-    let unrolls = |part: &Patch| part.mesh.faces().all(|f| part.mesh.part(f) != 0);
     let (large, others): (Vec<Patch>, Vec<Patch>) =
-        parts.into_iter().partition(|part| !unrolls(part) && is_large(part, settings));
+        parts.into_iter().partition(|part| !part.mesh.is_all_parts() && is_large(part, settings));
     let price = Price::new(&whole.mesh, settings);
     let mut charting = divide::divide(others, &price, settings, &|faces| charted.add(faces, 1.0), run)?;
     for part in large {

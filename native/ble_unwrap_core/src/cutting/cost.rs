@@ -8,8 +8,9 @@
 //! ([`TriMesh::border_cost`]); p is [`Settings::stretch_price`]. A move of the search is made only if the cost
 //! falls. The limit is no part of the cost: what is over it is no chart. To measure a weight again, change it and run `make quality` before and after.
 //!
-//! Two things that the sum does not see are weighed against seam by themselves, after the search: the worst stretch of a place
-//! ([`lowers_peak`]), and how much of a texture can be filled ([`fill_asks_for_a_cut`], [`fills_better`]).
+//! Three things that the sum does not see are weighed against seam by themselves, after the search: the worst stretch of a place
+//! ([`lowers_peak`]), how much of a texture can be filled ([`fill_asks_for_a_cut`], [`fills_better`]), and whether borders are straight
+//! ([`Price::is_worth_straightening`]).
 
 use std::sync::Arc;
 
@@ -29,7 +30,7 @@ const EXACT: f64 = 1.0001;
 /// To straighten the sides of what unrolls costs so many times the stretch: the wall of a cup, a little wider above than below, becomes a
 /// rectangle, and the fan of a cone stays as it is.
 const BENDING: f64 = 5.0;
-/// A minimum that was come to rest at may be lower by so much of L2 stretch.
+/// Minimisation stops within so much L2 stretch of the minimum.
 const AT_REST: f64 = 1e-3;
 
 /// A seam that nobody can see counts for this share of its length: no seam is for nothing.
@@ -92,8 +93,8 @@ pub(crate) struct Price {
     stretch: f64,
     /// Whether what unrolls may be bent where that is worth it.
     may_bend: bool,
-    /// The L2 stretch up to which a union of what unrolls does so, too.
-    unrolled: f64,
+    /// Whether a union of what unrolls may not be stretched more than its charts are.
+    is_exact: bool,
     /// [`Settings::straighten`].
     straight: f64,
 }
@@ -107,7 +108,7 @@ impl Price {
     pub(crate) fn on_area(area: f64, settings: &Settings) -> Self {
         let stretch = settings.stretch_price;
         let area = area.max(f64::MIN_POSITIVE);
-        Self { area, stretch, may_bend: may_bend(stretch), unrolled: UNROLLED, straight: settings.straighten }
+        Self { area, stretch, may_bend: may_bend(stretch), is_exact: false, straight: settings.straighten }
     }
 
     /// The same prices where what unrolls is worth no more than what does not: two halves that only their mirror plane keeps apart.
@@ -115,9 +116,9 @@ impl Price {
         Self { may_bend: true, ..self }
     }
 
-    /// The same prices where what unrolls stays as flat as it is: to hang on by a part of a border is no reason to bend at all.
+    /// The same prices where what unrolls is stretched no more than it is already: to hang on by a part of a border is no reason to bend.
     pub(super) fn exact(self) -> Self {
-        Self { unrolled: EXACT, ..self }
+        Self { is_exact: true, ..self }
     }
 
     /// What some length of seam costs.
@@ -159,7 +160,9 @@ impl Price {
         }
         if !self.may_bend && is_kept_unrolled(old) {
             // For one chart fewer a tenth of a per cent may do; to close the end of a cut is no reason to bend at all.
-            let most = if let [chart] = old { chart.l2.max(EXACT) } else { self.unrolled };
+            let is_exact = self.is_exact || old.len() == 1;
+            let unrolled = old.iter().filter(|chart| unrolls(chart));
+            let most = if is_exact { unrolled.fold(EXACT, |most, chart| most.max(chart.l2)) } else { UNROLLED };
             return settings.stretch_limit.min(most);
         }
         let share = old.iter().map(|chart| chart.patch.area()).sum::<f64>() / self.area;
@@ -212,7 +215,10 @@ impl CutPrice {
             return length;
         }
         let [m, n] = [h, t].map(|h| measure::triangle_normal(mesh.triangle_positions(h.face())));
-        length / (1.0 + (1.0 - m.dot(&n)).max(0.0)).powf(self.bends)
+        // A face without area has no normal, and bends nowhere.
+        let is_known = m.norm_squared() > 0.5 && n.norm_squared() > 0.5;
+        let bend = if is_known { (1.0 - m.dot(&n)).max(0.0) } else { 0.0 };
+        length / (1.0 + bend).powf(self.bends)
     }
 }
 
@@ -228,10 +234,10 @@ fn is_kept_unrolled(charts: &[&Chart]) -> bool {
 
 /// Whether a chart is made of parts between hard edges, unrolled.
 fn is_unrolled_part(chart: &Chart) -> bool {
-    unrolls(chart) && chart.patch.mesh.faces().all(|f| chart.patch.mesh.part(f) != 0)
+    unrolls(chart) && chart.patch.mesh.is_all_parts()
 }
 
-/// Whether a union of some charts cannot come under a limit: it is stretched no less than they are apart.
+/// Whether a union of some charts cannot come under a limit: the least stretch of a union is no less than the mean of its charts', by area.
 pub(super) fn is_out_of_reach(old: &[&Chart], limit: f64) -> bool {
     let (mut stretch, mut area) = (0.0, 0.0);
     for chart in old {
@@ -239,7 +245,6 @@ pub(super) fn is_out_of_reach(old: &[&Chart], limit: f64) -> bool {
         stretch += own * chart.l2 * chart.l2;
         area += own;
     }
-    // Where each of them came to rest is its minimum but for a little.
     (stretch / area).sqrt() > limit + AT_REST
 }
 

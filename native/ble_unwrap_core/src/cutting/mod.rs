@@ -173,25 +173,32 @@ fn charts_of(
     charted: &Charted<'_>,
     run: &Run<'_>,
 ) -> Result<Arc<Made>, Cancelled> {
-    let input = |f: &mut Fingerprint| {
+    let input = |f: &mut Fingerprint, straighten: f64| {
         f.mesh(&whole.mesh);
         f.numbers(&whole.polygon);
         // They are named in the result.
         f.indices(faces.iter().map(|face| face.index()));
         f.settings(&Settings {
+            straighten,
             chart_scale: ChartScale::Uniform,
             packing: PackSettings::default(),
             ..settings.clone()
         });
     };
     let bytes = |made: &Made| made.0.iter().map(|c| cache::bytes_of(&c.patch.mesh) + 24 * c.uv.len()).sum();
-    run.recall(Kind::Charts, input, bytes, || {
-        let (charts, mut rungs) = component::charts(whole, faces, settings, charted, run)?;
-        // Before they are copied. Under a limit over the atlas charts are still to be joined.
-        if settings.limit_over == LimitOver::Atlas {
-            return Ok((charts, rungs));
-        }
+    let found = || {
+        let charts = || component::charts(whole, faces, settings, charted, run);
+        run.recall(Kind::Charts, |f| input(f, 0.0), bytes, charts)
+    };
+    // Under a limit over the atlas charts are still to be joined.
+    if settings.limit_over == LimitOver::Atlas {
+        return found();
+    }
+    // Before they are copied, so that copies are alike.
+    let touched = || {
+        let (charts, mut rungs) = Made::clone(&*found()?);
         let price = Price::new(&whole.mesh, settings);
         Ok((touch_up(charts, &price, settings, &mut rungs, run.progress)?, rungs))
-    })
+    };
+    run.recall(Kind::TouchedUp, |f| input(f, settings.straighten), bytes, touched)
 }

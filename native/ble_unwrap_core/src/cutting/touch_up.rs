@@ -1,4 +1,4 @@
-//! Charts touched up once it is known where to cut: quads bent in the plane are made convex again, triangles stretched far more than
+//! Charts touched up after the search, and again where some had to be made anew: quads bent in the plane are made convex again, triangles stretched far more than
 //! the others are relaxed, and sides that are straight on the surface are laid along the axes.
 
 use std::sync::Arc;

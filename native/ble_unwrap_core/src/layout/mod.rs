@@ -71,8 +71,10 @@ pub(crate) fn lay_out(
                     certificate.faulty_charts.iter().filter_map(|&c| usize::try_from(c).ok()).collect();
                 let faults = Faults { round, faulty: &faulty, broken: &layout.broken };
                 charts = mend::mend(surface, charts, &faults, &mut rungs, settings, run)?;
-                let price = Price::new(&surface.mesh, settings);
-                charts = cutting::touch_up(charts, &price, settings, &mut rungs, run.progress)?;
+                // Sides that could be straightened are so already, and what was made anew is not looked at for them.
+                let unstraightened = Settings { straighten: 0.0, ..settings.clone() };
+                let price = Price::new(&surface.mesh, &unstraightened);
+                charts = cutting::touch_up(charts, &price, &unstraightened, &mut rungs, run.progress)?;
             }
         }
         clock.lap("mend");

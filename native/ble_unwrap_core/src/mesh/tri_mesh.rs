@@ -421,6 +421,12 @@ impl TriMesh {
         self.part.get(f.index()).copied().unwrap_or(0)
     }
 
+    /// Whether every face is in a part between hard edges.
+    #[must_use]
+    pub(crate) fn is_all_parts(&self) -> bool {
+        !self.part.is_empty() && self.part.iter().all(|part| *part != 0)
+    }
+
     /// What a border along an edge costs beside one of the same length at a place of the usual kind: less on a guide, and less where
     /// seams weigh less.
     #[inline]

@@ -27,10 +27,12 @@ pub(super) fn alone(outlines: &[Outline], which: usize, grid: Grid, settings: &P
         if lying.0 > upright.0 { lying.1 } else { upright.1 }
     };
     let settled = || {
-        let any = turn_alone(outline, room);
-        let is_worth = |turn| fit(outline, turn, room).scale >= UPRIGHT * fit(outline, any, room).scale;
-        let upright = || symmetric_turn(outline).map(upright_or_lying).filter(|&turn| is_worth(turn));
-        aligned_turn(outline).map(upright_or_lying).or_else(upright).unwrap_or(any)
+        let upright = || {
+            let any = turn_alone(outline, room);
+            let is_worth = |turn| fit(outline, turn, room).scale >= UPRIGHT * fit(outline, any, room).scale;
+            symmetric_turn(outline).map(upright_or_lying).filter(|&turn| is_worth(turn)).unwrap_or(any)
+        };
+        aligned_turn(outline).map_or_else(upright, upright_or_lying)
     };
     let turn = match settings.rotation {
         Rotation::Aligned => settled(),

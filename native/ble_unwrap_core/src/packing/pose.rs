@@ -92,10 +92,12 @@ pub(super) fn symmetric_turn(outline: &Outline) -> Option<[f64; 2]> {
     // Moments of second order.
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
     for [p, q] in sides() {
-        let (length, at) = ((q - p).norm(), 0.5 * (p.coords + q.coords) - mean);
-        xx += length * at.x * at.x;
-        xy += length * at.x * at.y;
-        yy += length * at.y * at.y;
+        let (along, at) = (q - p, 0.5 * (p.coords + q.coords) - mean);
+        let length = along.norm();
+        // Of the middle, and of the side around it.
+        xx += length * (at.x * at.x + along.x * along.x / 12.0);
+        xy += length * (at.x * at.y + along.x * along.y / 12.0);
+        yy += length * (at.y * at.y + along.y * along.y / 12.0);
     }
     let (apart, spread) = ((xx - yy).hypot(2.0 * xy), xx + yy);
     if spread.is_nan() || apart <= LEAST_LONGER * spread {

@@ -15,8 +15,8 @@ const HARD_OF_MANUFACTURED: f64 = 40.0;
 /// be the apex of a cone. A spherical cap of so much curvature, which ends 23° from its pole, has an L2 stretch of 1.0001 in the plane,
 /// and one that ends at 40° has 1.0008.
 const MOST_CURVED: f64 = 0.5;
-/// Parts have so many triangles in the mean. With fewer they are the facets of a crystal or of crumpled paper, and distances tell better which
-/// of them belong together.
+/// Parts have at least so many triangles on average. With fewer they are the facets of a crystal or of crumpled paper, and distances tell better
+/// which of them belong together.
 const LEAST_FACES: usize = 6;
 /// A thing is manufactured if parts that unroll have at least this share of its area; then all of them are kept. With a half in its place a
 /// table with barrels and bottles on it has 1.7 times as much seam, and a fan disk 1.4 times.
@@ -27,34 +27,34 @@ const LEAST_PLANE: f64 = 0.05;
 const MOST_LEANING: f64 = 3.0;
 
 /// The parts between the hard edges of a thing that unroll without stretch: a number from 1 on for each face, and 0 for
-/// faces that are in none. Empty where there are no such parts, or nothing else than one, and where guides run inside: they say where it is
-/// to be cut. Unless it is known to be manufactured, parts count only where they tell so, or are large planes. O(n log n).
+/// faces that are in none. Empty where there are no such parts or the whole is one. Of what is not known to be manufactured, parts count
+/// only if most of it is made of them, or if they are large planes, and not where there are guides: these say where to cut. O(n log n).
 pub(crate) fn unrolling_parts(mesh: &TriMesh, polygon: &[u32], is_manufactured: bool) -> Vec<u32> {
-    if mesh.has_guides() {
+    if mesh.has_guides() && !is_manufactured {
         return Vec::new();
     }
-    let normals = measure::face_normals(mesh);
+    let (normals, areas) = (measure::face_normals(mesh), measure::face_areas(mesh));
     let least = if is_manufactured { HARD_OF_MANUFACTURED } else { HARD }.to_radians().cos();
     let is_hard = |h: HalfedgeId| {
-        let (f, g) = (h.face(), mesh.twin(h).face());
-        polygon[f.index()] != polygon[g.index()] && normals[f.index()].dot(&normals[g.index()]) <= least
+        let (f, g) = (h.face().index(), mesh.twin(h).face().index());
+        // A face without area has no normal, and no edge of it is hard.
+        areas[f].min(areas[g]) > 0.0 && polygon[f] != polygon[g] && normals[f].dot(&normals[g]) <= least
     };
     let (part, parts) = connected(mesh, |h| !is_hard(h));
-    if parts < 2 {
+    if parts < 2 || areas.iter().all(|area| *area <= 0.0) {
         return Vec::new();
     }
-    let areas = measure::face_areas(mesh);
     let mut area = vec![0.0; parts];
     areas.iter().zip(&part).for_each(|(a, p)| area[*p as usize] += a);
     let total: f64 = area.iter().sum();
     let unrolls = unrolling(mesh, &part, parts);
     let unrolled: f64 = (0..parts).filter(|&p| unrolls[p]).map(|p| area[p]).sum();
-    let are_parts = parts * LEAST_FACES <= mesh.face_count() && unrolled >= LEAST_SHARE * total && total > 0.0;
+    let are_parts = parts * LEAST_FACES <= mesh.face_count() && unrolled >= LEAST_SHARE * total;
     let is_taken: Vec<bool> = if is_manufactured || are_parts {
         unrolls
     } else {
         let is_plane = plane(&normals, &areas, &part, parts);
-        (0..parts).map(|p| is_plane[p] && area[p] >= LEAST_PLANE * total && total > 0.0).collect()
+        (0..parts).map(|p| is_plane[p] && area[p] >= LEAST_PLANE * total).collect()
     };
     if !is_taken.contains(&true) {
         return Vec::new();
@@ -240,6 +240,7 @@ mod tests {
         let (mesh, polygon) = turned(24, &[[1.0, 0.0], [1.0, 20.0]]);
         let marks = mesh.halfedges().map(|h| mesh.edge_length(h) > 19.0 && mesh.edge_length(h) < 20.01).collect();
         let guided = mesh.with_guides(marks);
-        assert!(guided.has_guides() && unrolling_parts(&guided, &polygon, true).is_empty());
+        assert!(guided.has_guides() && unrolling_parts(&guided, &polygon, false).is_empty());
+        assert!(!unrolling_parts(&guided, &polygon, true).is_empty(), "unless it is known to be manufactured");
     }
 }

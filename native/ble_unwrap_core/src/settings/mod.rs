@@ -134,9 +134,9 @@ pub enum Style {
 }
 
 choices!(Style {
-    Auto: "auto", "Auto", "Of each connected piece all that unrolls where most of it does, else large planes.";
-    Organic: "organic", "Organic", "Hard edges are places like others.";
-    Hard: "hard", "Hard Surface", "All that unrolls between hard edges keeps its shape, and they count from a lower angle on.";
+    Auto: "auto", "Auto", "If most of a connected piece lies flat without stretch between hard edges, all such parts do so; else large planes do.";
+    Organic: "organic", "Organic", "Hard edges are not treated specially.";
+    Hard: "hard", "Hard Surface", "Every part that can lies flat without stretch, and edges count as hard from 40° instead of 50°.";
 });
 
 /// How charts are scaled relative to each other.
@@ -233,12 +233,13 @@ pub struct Settings {
     /// Whether charts of mirrored surfaces are mirrored, too. A mirror plane is one that takes every vertex of a connected piece to
     /// another, to a thousandth of its size, and every polygon to another. UVs are not mirrored: each half has its own place.
     pub symmetry: Symmetry,
-    /// What kind of thing the mesh is. Planes, walls of cylinders and the like between hard edges are not bent: they come out as they are, and
-    /// are joined to others only where what comes of that unrolls, too.
+    /// What kind of thing the mesh is. Planes, walls of cylinders and the like, which lie flat without stretch, are cut out at the hard edges around
+    /// them and come out as they are; they are joined to others only if the result lies flat, too. Has an effect only with all `moves`; a limit
+    /// over the atlas, and the mirror plane of a symmetric piece, may join them otherwise.
     pub style: Style,
     /// How much seam a straight side is worth that lies along an axis of the texture: where the border of a chart runs straight on the surface
     /// between two corners, it is made straight in the chart, and laid along an axis, if that costs less in stretch than so many times its
-    /// length costs as seam. Has no effect where `stretch_price` is 0.
+    /// length costs as seam. Has an effect only with all `moves`, and none where `stretch_price` is 0.
     pub straighten: f64,
     /// What happens to the holes of charts.
     pub holes: Holes,

@@ -46,11 +46,11 @@ const MOST_WORST: f64 = 0.05;
 const WORST_RINGS: usize = 4;
 /// The worst triangles are mended by so many steps at most.
 const WORST_STEPS: usize = 12;
-/// Drawing edges to the axes goes on to the next weight when a step gains less than this share.
-const ALIGN_TOLERANCE: f64 = 1e-3;
-
 /// Mending the worst triangles ends when a step gains less than this share.
 const WORST_TOLERANCE: f64 = 1e-2;
+
+/// Drawing edges to the axes goes on to the next weight when a step gains less than this share.
+const ALIGN_TOLERANCE: f64 = 1e-3;
 
 /// Minimises over all vertices; `start` has been checked to be positive, and simple if that is to
 /// be kept.

@@ -27,8 +27,8 @@ const WEIGHTS: [f64; 2] = [1e2, 1e5];
 const HALVES_WEIGHT: f64 = 0.01;
 
 /// Turns a map so that the sides of the chart lie near the axes, and moves its vertices with the least stretch until they lie along them. A
-/// side is a run of the border between two corners that is straight on the surface, or nearly so in the plane: neither the number of its edges
-/// nor how faces are divided matters.
+/// side is a run of the border between two corners that is straight on the surface, or nearly so in the plane; how many edges it has between the
+/// corners does not matter, nor how faces are divided.
 ///
 /// `start` must be without flips and have a simple boundary; so has the result, by exact tests, and none of `quads` is bent that was
 /// not. `is_worth` tells of a map, and of how much more of the border lies along the axes there, by its length on the surface, whether that is to

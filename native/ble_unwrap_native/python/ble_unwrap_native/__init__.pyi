@@ -72,7 +72,7 @@ class _ChartsGroup(TypedDict, total=False):
     symmetry: Literal["auto", "off"]
     """Whether seams of mirrored surfaces are mirrored, too. "auto": Where a piece has a mirror plane along edges, so have its seams. "off": Seams are found without regard to mirror planes."""
     style: Literal["auto", "organic", "hard"]
-    """Whether planes, cylinders and the like between hard edges keep their shape. "auto": Of each connected piece all that unrolls where most of it does, else large planes. "organic": Hard edges are places like others. "hard": All that unrolls between hard edges keeps its shape, and they count from a lower angle on."""
+    """Whether planes, cylinders and the like between hard edges keep their shape. "auto": If most of a connected piece lies flat without stretch between hard edges, all such parts do so; else large planes do. "organic": Hard edges are not treated specially. "hard": Every part that can lies flat without stretch, and edges count as hard from 40° instead of 50°."""
     straighten: float
     """How much seam a straight side along an axis of the texture is worth. Sides of charts that are straight on the surface are made straight where that costs less in stretch; 0 leaves them as they are."""
     moves: Literal["split", "join", "all"]

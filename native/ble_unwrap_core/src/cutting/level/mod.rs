@@ -318,7 +318,11 @@ impl<'a> OnCoarse<'a> {
 
     /// A patch and its start, cut open where two edges join the same vertices, as far as the coarse chart was not.
     fn opened(&self, patch: Patch, start: Positions) -> (Patch, Positions) {
-        if self.settings.moves == Moves::All { dart::without_doubled_edges(patch, start) } else { (patch, start) }
+        if self.settings.moves == Moves::All {
+            dart::without_doubled_edges(patch, start, self.settings)
+        } else {
+            (patch, start)
+        }
     }
 
     fn step(&self, part: &Part, rungs: &mut Rungs, run: &Run<'_>) -> Result<Outcome<Made, Part>, Cancelled> {

@@ -99,11 +99,15 @@ impl<'a> Bulging<'a> {
 }
 
 /// A patch, and where its vertices lie in the plane, opened where two edges join the same vertices, as no straight lines can.
-pub(crate) fn without_doubled_edges(patch: Patch, uv: Vec<Point2<f64>>) -> (Patch, Vec<Point2<f64>>) {
+pub(crate) fn without_doubled_edges(
+    patch: Patch,
+    uv: Vec<Point2<f64>>,
+    settings: &Settings,
+) -> (Patch, Vec<Point2<f64>>) {
     let (mut patch, mut uv) = (patch, uv);
     for _ in 0..MOST_DOUBLED {
         let Some(open) =
-            stretch::enclosed_vertex(&patch.mesh).and_then(|tip| cut_to(&patch, tip, None, CutPrice::OF_NET))
+            stretch::enclosed_vertex(&patch.mesh).and_then(|tip| cut_to(&patch, tip, None, CutPrice::new(settings)))
         else {
             break;
         };
@@ -213,7 +217,7 @@ pub(super) mod tests {
         let open = of(&patch, 1.1, |bulging| bulging.with_enough_darts().expect("memory")).expect("one dart does");
         assert_eq!(stretch::enclosed_vertex(&open.mesh), None);
         let uv: Vec<Point2<f64>> = patch.mesh.positions().iter().map(|p| p.xy()).collect();
-        let (opened, start) = without_doubled_edges(patch.clone(), uv);
+        let (opened, start) = without_doubled_edges(patch.clone(), uv, &Settings::default());
         assert_eq!(opened.mesh.triangles(), open.mesh.triangles());
         assert!(start.iter().zip(opened.mesh.positions()).all(|(s, p)| *s == p.xy()));
     }
