@@ -316,7 +316,7 @@ fn a_machined_part_is_cut_at_its_hard_edges_and_nowhere_else() {
 }
 
 #[test]
-fn a_bevelled_box_keeps_its_flats_where_it_is_known_to_be_manufactured() {
+fn a_bevelled_prism_keeps_its_flats_where_it_is_known_to_be_manufactured() {
     // An octagon, high: its walls are 45 degrees apart, which is round unless one says that it is not.
     let mesh = lathe(8, &[[0.8, 0.0], [1.0, 0.2], [1.0, 2.0], [0.8, 2.2]]);
     let hard = unwrapped(&mesh, &Settings { style: Style::Hard, ..Settings::default() });

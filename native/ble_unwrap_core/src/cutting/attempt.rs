@@ -56,6 +56,11 @@ pub(super) fn unrolls(patch: &Patch, settings: &Settings, run: &Run<'_>) -> bool
     Attempt::new(&measured, settings, run).without_stretch(&mut Rungs::default()).is_some()
 }
 
+/// Whether a patch has parts between hard edges and is divided there, not bent as a whole.
+pub(super) fn comes_apart(patch: &Patch, settings: &Settings) -> bool {
+    !cost::may_bend(settings.stretch_price) && segmentation::between_parts(&patch.mesh).is_some()
+}
+
 fn is_sphere(topology: Topology) -> bool {
     topology.loops == 0 && topology.genus() == 0
 }
@@ -101,8 +106,7 @@ impl<'a> Attempt<'a> {
         if let Some(chart) = self.without_stretch(rungs) {
             return Ok(Some(chart));
         }
-        // A patch with parts between hard edges is divided there, not bent as a whole.
-        if !cost::may_bend(self.settings.stretch_price) && segmentation::between_parts(&patch.mesh).is_some() {
+        if comes_apart(patch, self.settings) {
             return Ok(None);
         }
         if may_be_chart || is_closed {

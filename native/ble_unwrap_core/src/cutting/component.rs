@@ -5,6 +5,7 @@ use crate::charts::{Chart, Patch};
 use crate::flattening::Rungs;
 use crate::mesh::FaceId;
 use crate::progress::Cancelled;
+use crate::segmentation;
 use crate::settings::Settings;
 
 use super::charted::Charted;
@@ -38,8 +39,7 @@ pub(crate) fn charts(
     let size = faces.len() as f64;
     let mut rungs = Rungs::default();
     let is_large = is_large(whole, settings);
-    let parts = if is_large || whole.mesh.is_all_parts() { split::hard_parts(whole) } else { None };
-    let all_unroll = parts.is_some() && whole.mesh.is_all_parts();
+    let all_unroll = whole.mesh.is_all_parts() && segmentation::between_parts(&whole.mesh).is_some();
     if !all_unroll && let Some(mirror) = symmetric::mirror(whole, is_large, settings, run)? {
         let of_half = |half: &Patch, faces: &[FaceId], once: &Settings| charts(half, faces, once, charted, run);
         if let Some((mut charts, rungs)) = symmetric::charts(whole, &mirror, is_large, settings, &of_half, run)? {
@@ -49,8 +49,8 @@ pub(crate) fn charts(
         }
     }
     // What unrolls needs no trials that a coarse mesh would make cheap, and has its edges on the fine one.
-    let parts = parts.filter(|_| is_large && (all_unroll || !cost::may_bend(settings.stretch_price)));
-    let mut charts = if let Some(parts) = parts {
+    let is_divided = is_large && (all_unroll || !cost::may_bend(settings.stretch_price));
+    let mut charts = if let Some(parts) = is_divided.then(|| split::hard_parts(whole)).flatten() {
         let charting = by_parts(parts, whole, settings, charted, run)?;
         rungs.add(&charting.rungs);
         // A large union is as costly to embed whether or not its parts unroll.

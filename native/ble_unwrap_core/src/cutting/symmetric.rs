@@ -9,12 +9,11 @@ use crate::charts::{Chart, Patch};
 use crate::flattening::{Rung, Rungs};
 use crate::mesh::{self, FaceId, Mirror};
 use crate::progress::Cancelled;
-use crate::segmentation;
 use crate::settings::{LimitOver, Moves, Settings, Symmetry};
 
 use super::attempt;
 use super::copied::copied;
-use super::cost::{self, Price};
+use super::cost::Price;
 use super::history::{History, MoveKind};
 use super::moves::join::{Join, Which};
 use super::moves::partial_join::PartialJoin;
@@ -40,8 +39,9 @@ pub(super) fn mirror(
         return Ok(None);
     }
     let mirror = mesh::mirror(&patch.mesh, &patch.polygon, run.progress)?;
-    let is_divided = !cost::may_bend(settings.stretch_price) && segmentation::between_parts(&patch.mesh).is_some();
-    if mirror.is_some() && !is_large && !is_divided && attempt::may_be_chart(patch.mesh.topology(), settings) {
+    let may_stay_whole =
+        || !attempt::comes_apart(patch, settings) && attempt::may_be_chart(patch.mesh.topology(), settings);
+    if mirror.is_some() && !is_large && may_stay_whole() {
         // What needs no cut gets none.
         let stretch_limit = Price::new(&patch.mesh, settings).limit(patch, settings);
         let worth_it = Settings { stretch_limit, ..settings.clone() };

@@ -15,7 +15,7 @@ use crate::progress::{Cancelled, Progress};
 use crate::settings::{LimitOver, Moves, Settings};
 use crate::stretch::{self, StretchError};
 
-use super::cost::Price;
+use super::cost::{self, Price};
 
 /// The L2 stretch of a chart may rise by so much for its L-infinity stretch to fall.
 const MOST_RISE: f64 = 1e-3;
@@ -46,14 +46,8 @@ fn affordable_rise(charts: &[Chart], settings: &Settings) -> f64 {
     if settings.limit_over == LimitOver::Chart {
         return f64::INFINITY;
     }
-    let (mut stretch, mut area) = (0.0, 0.0);
-    for chart in charts {
-        let share = chart.patch.area();
-        stretch += share * chart.l2 * chart.l2;
-        area += share;
-    }
-    // The whole's stretch is the root of that mean, which rises by no more than all charts do. NaN, of no area, is none.
-    (settings.stretch_limit - (stretch / area).sqrt()).max(0.0)
+    // The stretch of all together rises by no more than that of each does. NaN, of no area, is none.
+    (settings.stretch_limit - cost::l2_together(charts)).max(0.0)
 }
 
 /// A chart under its limit stays under it; of one that is over it no more is asked.

@@ -19,7 +19,7 @@ const MOST_CURVED: f64 = 0.5;
 /// which of them belong together.
 const LEAST_FACES: usize = 6;
 /// A thing is manufactured if parts that unroll have at least this share of its area; then all of them are kept. With a half in its place a
-/// table with barrels and bottles on it has 1.7 times as much seam, and a fan disk 1.4 times.
+/// table with barrels and bottles on it has twice as much seam, and a fan disk 1.4 times.
 const LEAST_SHARE: f64 = 0.8;
 /// Of other things, plane parts of at least this share of the area are parts: the caps of a barrel, the base of a bust.
 const LEAST_PLANE: f64 = 0.05;

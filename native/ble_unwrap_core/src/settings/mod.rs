@@ -125,18 +125,18 @@ choices!(Symmetry {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Style {
-    /// Of each connected piece what it shows: all that unrolls where most of it does, else large planes.
+    /// Each connected piece is judged by itself: if most of it unrolls between hard edges, all such parts keep their shape, else large planes do.
     Auto,
-    /// Grown: hard edges are places like others.
+    /// The mesh has grown, and hard edges are not treated specially.
     Organic,
-    /// Manufactured: all that unrolls between hard edges keeps its shape.
+    /// The mesh is manufactured, and all that unrolls between hard edges keeps its shape.
     Hard,
 }
 
 choices!(Style {
-    Auto: "auto", "Auto", "If most of a connected piece lies flat without stretch between hard edges, all such parts do so; else large planes do.";
+    Auto: "auto", "Auto", "Parts between hard edges that can lie flat without stretch do so, if most of a connected piece is made of them; else only its large planes do.";
     Organic: "organic", "Organic", "Hard edges are not treated specially.";
-    Hard: "hard", "Hard Surface", "Every part that can lies flat without stretch, and edges count as hard from 40° instead of 50°.";
+    Hard: "hard", "Hard Surface", "All such parts lie flat without stretch, whatever the piece is made of, and edges count as hard from 40° instead of 50°.";
 });
 
 /// How charts are scaled relative to each other.

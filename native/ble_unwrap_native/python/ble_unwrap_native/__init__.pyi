@@ -72,7 +72,7 @@ class _ChartsGroup(TypedDict, total=False):
     symmetry: Literal["auto", "off"]
     """Whether seams of mirrored surfaces are mirrored, too. "auto": Where a piece has a mirror plane along edges, so have its seams. "off": Seams are found without regard to mirror planes."""
     style: Literal["auto", "organic", "hard"]
-    """Whether planes, cylinders and the like between hard edges keep their shape. "auto": If most of a connected piece lies flat without stretch between hard edges, all such parts do so; else large planes do. "organic": Hard edges are not treated specially. "hard": Every part that can lies flat without stretch, and edges count as hard from 40° instead of 50°."""
+    """Whether planes, cylinders and the like between hard edges keep their shape. "auto": Parts between hard edges that can lie flat without stretch do so, if most of a connected piece is made of them; else only its large planes do. "organic": Hard edges are not treated specially. "hard": All such parts lie flat without stretch, whatever the piece is made of, and edges count as hard from 40° instead of 50°."""
     straighten: float
     """How much seam a straight side along an axis of the texture is worth. Sides of charts that are straight on the surface are made straight where that costs less in stretch; 0 leaves them as they are."""
     moves: Literal["split", "join", "all"]
