@@ -25,6 +25,7 @@ from .mesh_arrays import (
 )
 
 MARKS = ("seams", "sharp", "materials")  # what an artist marks edges by
+ONLY_MARKED = 180.0  # degrees; no edge is sharper, so that only those that are marked sharp are
 ACTIVE_MAP = uv_maps.MapChoice()
 SCALE_TOLERANCE = 1e-3  # relative difference of an object's axes from which its scale counts as non-uniform
 
@@ -81,11 +82,12 @@ def unique_meshes(objects):
     return result
 
 
-def gather(objects, *, only_selected=False, by_uv=False, target=ACTIVE_MAP, move_pinned=True):
+def gather(objects, *, only_selected=False, by_uv=False, target=ACTIVE_MAP, move_pinned=True, sharp_angle=ONLY_MARKED):
     """Reads the objects' base meshes (before modifiers and shape keys) as one `Selection`.
 
     `only_selected` and `by_uv` as in `chosen_faces`; they matter for objects in edit mode. `target` is the UV map that
-    will be written. Raises `MeshError` where it cannot be, or where pinned UVs would be moved and may not be.
+    will be written, `sharp_angle` is in degrees. Raises `MeshError` where the map cannot be written, or where pinned
+    UVs would be moved and may not be.
     """
     warnings, parts, blocks, reasons = [], [], [], []
     vertex_base = corner_base = face_base = 0
@@ -101,7 +103,7 @@ def gather(objects, *, only_selected=False, by_uv=False, target=ACTIVE_MAP, move
         except NothingToUnwrap as error:
             reasons.append(error)
             continue
-        block = read_mesh(mesh, chosen)
+        block = read_mesh(mesh, chosen, sharp_angle)
         if not move_pinned:
             uv_maps.check_pins(obj, target, block["source_corners"])
         positions, note = scale_as_in_scene(block["positions"], obj.matrix_world)
@@ -153,13 +155,13 @@ def gather(objects, *, only_selected=False, by_uv=False, target=ACTIVE_MAP, move
     )
 
 
-def read_mesh(mesh, chosen):
+def read_mesh(mesh, chosen, sharp_angle=ONLY_MARKED):
     """Arrays of one mesh, compacted to the chosen faces, (f,) bool; None: all."""
     positions = read_positions(mesh)
     corner_vertices = read_corner_vertices(mesh)
     offsets = read_face_offsets(mesh)
     sizes = np.diff(offsets)
-    marks = read_marks(mesh, sizes)
+    marks = read_marks(mesh, sizes, sharp_angle)
     mesh.calc_loop_triangles()
     triangles = read_array(mesh.loop_triangles, "loops", np.int32, 3)
     source_faces = source_corners = None
@@ -188,23 +190,34 @@ def read_mesh(mesh, chosen):
     }
 
 
-def read_marks(mesh, face_sizes):
+def read_marks(mesh, face_sizes, sharp_angle):
     """The edges of each kind in `MARKS` as pairs of vertices: the artist's seams, sharp edges, borders of materials."""
     edges = read_array(mesh.edges, "vertices", np.int32, 2)
-    marks = {
-        "seams": edges[seams.wished_seams(mesh)],
-        "sharp": edges[read_array(mesh.edges, "use_edge_sharp", bool)],
-        "materials": edges[:0],
-    }
+    corner_edges = read_array(mesh.loops, "edge_index", np.int32)
+    sharp = read_array(mesh.edges, "use_edge_sharp", bool)
+    if sharp_angle < ONLY_MARKED:
+        sharp = sharp | bends(mesh, corner_edges, face_sizes, sharp_angle)
+    border = np.zeros(len(edges), bool)
     if len(mesh.materials) > 1:
-        corner_edges = read_array(mesh.loops, "edge_index", np.int32)
         material = np.repeat(read_array(mesh.polygons, "material_index", np.int32), face_sizes)
         any_of = np.zeros(len(edges), np.int32)
         any_of[corner_edges] = material
-        border = np.zeros(len(edges), bool)
         border[corner_edges[material != any_of[corner_edges]]] = True
-        marks["materials"] = edges[border]
-    return marks
+    return {"seams": edges[seams.wished_seams(mesh)], "sharp": edges[sharp], "materials": edges[border]}
+
+
+def bends(mesh, corner_edges, face_sizes, least_angle):
+    """The edges at which the normals of two faces are at least so many degrees apart, (e,) bool."""
+    normals = read_array(mesh.polygons, "normal", np.float32, 3)
+    face = np.repeat(np.arange(len(face_sizes)), face_sizes)
+    order = np.argsort(corner_edges, kind="stable")
+    of_edge = np.bincount(corner_edges, minlength=len(mesh.edges))
+    first = np.cumsum(of_edge) - of_edge
+    with_two = np.flatnonzero(of_edge == 2)
+    one, other = (normals[face[order[first[with_two] + side]]] for side in (0, 1))
+    bent = np.zeros(len(mesh.edges), bool)
+    bent[with_two] = (one * other).sum(axis=1) <= np.cos(np.radians(least_angle)) + 1e-6
+    return bent
 
 
 def scale_as_in_scene(positions, matrix_world):

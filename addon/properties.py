@@ -71,6 +71,28 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         ),
         default=True,
     )
+    use_sharp: BoolProperty(
+        name="Cut at Sharp Edges",
+        description="Cut along all edges that are marked sharp, and those sharper than Sharp Angle",
+        default=False,
+    )
+    use_materials: BoolProperty(
+        name="Cut at Materials",
+        description="Cut along all borders between materials, so that no chart has two of them",
+        default=False,
+    )
+    sharp_angle: FloatProperty(
+        name="Sharp Angle",
+        description=(
+            "Edges at which the normals of two faces are at least so many degrees apart count as sharp, whether or not "
+            "they are marked; at 180 only marked ones do"
+        ),
+        default=180.0,
+        min=1.0,
+        max=180.0,
+        step=100,
+        precision=1,
+    )
     follow_seams: BoolProperty(
         name="Follow Seams",
         description="Where a chart needs a border, draw it to seams of the mesh, without cutting all of them",
@@ -183,7 +205,8 @@ BRIDGE_SETTINGS = tuple(
 )
 # What means something for surfaces only, or for clouds only; the other one's functions do not take it.
 SURFACE_SETTINGS = (
-    *("use_seams", "follow_seams", "follow_sharp", "follow_materials", "mark_seams"),
+    *("use_seams", "use_sharp", "use_materials", "sharp_angle"),
+    *("follow_seams", "follow_sharp", "follow_materials", "mark_seams"),
     *("move_pinned", "correct_aspect"),
     *sorted(settings_table.taken_by("unwrap") - settings_table.taken_by("unwrap_points")),
 )
@@ -196,6 +219,7 @@ ADVANCED_SETTINGS = (
     (
         "Borders",
         (
+            *("use_sharp", "use_materials", "sharp_angle"),
             *("follow_seams", "follow_sharp", "follow_materials", "crease_weight"),
             *("hide_seams", "front", "symmetry", "style", "straighten"),
         ),

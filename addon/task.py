@@ -58,6 +58,7 @@ class UnwrapTask:
             by_uv=by_uv,
             target=self.target,
             move_pinned=self.settings["move_pinned"],
+            sharp_angle=self.settings["sharp_angle"],
         )
         self.native = properties.native_values(settings, properties.CLOUD_SETTINGS)
         self.native |= {name: self.settings[name] for name in properties.KEPT_BY_PRESETS}
@@ -108,7 +109,7 @@ class UnwrapTask:
         return self.selection.face_count
 
     def _call(self, function):
-        cut = ("seams",) if self.settings["use_seams"] else ()
+        cut = [kind for kind in mesh_bridge.MARKS if self.settings[f"use_{kind}"]]
         follow = [kind for kind in mesh_bridge.MARKS if self.settings[f"follow_{kind}"] and kind not in cut]
         self.timer.start()
         return function(self.selection, self.native, cut=cut, follow=follow, keep=self.keep)

@@ -317,6 +317,26 @@ def test_borders_follow_what_is_marked_unless_told_not_to(kind):
     assert fingerprint(obj) == before
 
 
+@pytest.mark.parametrize("kind", ["seams", "sharp", "materials"])
+def test_all_that_is_marked_is_cut_where_that_is_wished(kind):
+    obj, around = marked_cap(kind)
+    before = fingerprint(obj)
+    unwrap(**{f"use_{kind}": True})
+    assert_good(obj)
+    assert all(is_cut(obj, index) for index in around)
+    assert fingerprint(obj) == before
+
+
+def test_edges_over_an_angle_are_cut():
+    obj = cube()
+    unwrap(use_sharp=True, sharp_angle=89.0)
+    assert all(is_cut(obj, edge.index) for edge in obj.data.edges)
+    assert_good(obj)
+    for angle in (91.0, 180.0):
+        unwrap(use_sharp=True, sharp_angle=angle)
+        assert not all(is_cut(obj, edge.index) for edge in obj.data.edges)
+
+
 def test_marks_of_selected_faces_are_read(addon):
     obj, around = marked_cap("seams")
     bridge = addon("mesh_bridge")

@@ -317,11 +317,89 @@ fn a_machined_part_is_cut_at_its_hard_edges_and_nowhere_else() {
 
 #[test]
 fn a_bevelled_prism_keeps_its_flats_where_it_is_known_to_be_manufactured() {
-    // An octagon, high: its walls are 45 degrees apart, which is round unless one says that it is not.
+    // An octagon, high: its walls are 45 degrees apart, which is round unless one says that it is not. Its bevels are not made strips.
     let mesh = lathe(8, &[[0.8, 0.0], [1.0, 0.2], [1.0, 2.0], [0.8, 2.2]]);
-    let hard = unwrapped(&mesh, &Settings { style: Style::Hard, ..Settings::default() });
-    let auto = unwrapped(&mesh, &Settings::default());
+    let hard = unwrapped(&mesh, &Settings { style: Style::Hard, straighten: 0.0, ..Settings::default() });
+    let auto = unwrapped(&mesh, &Settings { straighten: 0.0, ..Settings::default() });
     assert!(hard.report.l2 < 1.001 && hard.report.l2 < auto.report.l2, "{} {}", hard.report.l2, auto.report.l2);
+}
+
+/// A box with sides of `wide` between bevels of `strips` faces each.
+fn bevelled_box(wide: [f64; 3], bevel: f64, strips: usize) -> PolyMesh {
+    let cells = 2 * strips + 1;
+    voxels([cells; 3], |_| true).moved(|p| {
+        let (mut core, mut out) = ([0.0; 3], [0.0; 3]);
+        for axis in 0..3 {
+            let from_middle = p[axis] - 0.5 * cells as f64;
+            core[axis] = from_middle.signum() * 0.5 * wide[axis];
+            let share = (from_middle.abs() - 0.5) / strips as f64;
+            out[axis] = from_middle.signum() * (0.25 * std::f64::consts::PI * share).tan();
+        }
+        let length = out.iter().map(|x| x * x).sum::<f64>().sqrt();
+        [0, 1, 2].map(|axis| core[axis] + bevel * out[axis] / length)
+    })
+}
+
+#[test]
+fn a_bevelled_box_is_made_of_rectangles_with_its_bevels_beside_them() {
+    for (wide, bevel, strips) in
+        [([2.0; 3], 0.15, 1), ([6.0, 1.5, 0.6], 0.08, 1), ([1.4; 3], 0.3, 3), ([3.0, 2.0, 1.0], 0.1, 2)]
+    {
+        for mesh in in_all_ways(&bevelled_box(wide, bevel, strips)) {
+            let atlas = unwrapped(&mesh, &Settings::default());
+            assert!(atlas.report.l2 < 1.003 && atlas.report.charts <= 3, "{wide:?}: {}", atlas.report.l2);
+            assert!(aligned_share(&mesh, &atlas) > 0.8, "{wide:?}: {}", aligned_share(&mesh, &atlas));
+        }
+    }
+}
+
+#[test]
+fn a_bottle_is_a_rectangle_with_a_shoulder_and_round_ends() {
+    for (high, neck) in [(3.0, 0.35), (6.0, 0.25), (2.0, 0.5)] {
+        let shoulder = (1..=6).map(|k| std::f64::consts::PI * f64::from(k) / 6.0);
+        let shoulder = shoulder.map(|t| [1.0 - (1.0 - neck) * 0.5 * (1.0 - t.cos()), high + t / std::f64::consts::PI]);
+        let wall = (0..=4).map(|k| [1.0, 0.25 * f64::from(k) * high]);
+        let profile: Vec<[f64; 2]> = wall.chain(shoulder).chain([[neck, high + 1.5]]).collect();
+        for mesh in in_all_ways(&lathe(32, &profile)) {
+            let atlas = unwrapped(&mesh, &Settings::default());
+            let seams = seams(&mesh, &atlas);
+            let ring = |row: u32| seams.iter().filter(|edge| edge.iter().all(|v| v / 32 == row)).count();
+            // All around the shoulder, and around the base but where this hangs on by some edges.
+            assert!(ring(4) == 32 && ring(0) >= 28 && (1..4).all(|row| ring(row) == 0), "{high}");
+            let down = seams.iter().filter(|edge| edge.iter().all(|v| v / 32 <= 4) && edge[0] / 32 != edge[1] / 32);
+            assert_eq!(down.count(), 4, "the wall is cut once, along a line");
+            assert!(atlas.report.charts <= 5 && atlas.report.l2 < 1.008, "{high}: {}", atlas.report.l2);
+        }
+    }
+}
+
+/// A body of revolution around z of a closed profile.
+fn turned_ring(sides: usize, profile: &[[f64; 2]]) -> PolyMesh {
+    let n = profile.len();
+    wrapped_grid(sides, n, [true, true], |u, v| {
+        let [r, z] = profile[(v * n as f64).round() as usize % n];
+        let (s, c) = (std::f64::consts::TAU * u).sin_cos();
+        [r * c, r * s, z]
+    })
+}
+
+#[test]
+fn the_rims_of_a_hoop_are_strips_and_those_of_a_washer_are_round() {
+    for sides in [12, 48] {
+        for (inner, high) in [(0.94, 0.3), (0.88, 0.25)] {
+            let hoop = turned_ring(sides, &[[inner, 0.0], [1.0, 0.0], [1.0, high], [inner, high]]);
+            for mesh in in_all_ways(&hoop) {
+                let atlas = unwrapped(&mesh, &Settings::default());
+                let aligned = aligned_share(&mesh, &atlas);
+                assert!(aligned > 0.9 && atlas.report.l2 < 1.01, "{sides}: {aligned} {}", atlas.report.l2);
+                let round = unwrapped(&mesh, &Settings { straighten: 0.0, ..Settings::default() });
+                assert!(round.report.l2 < 1.0001 && aligned_share(&mesh, &round) < 0.7);
+            }
+        }
+        for mesh in in_all_ways(&turned_ring(sides, &[[0.5, 0.0], [1.0, 0.0], [1.0, 0.1], [0.5, 0.1]])) {
+            assert!(unwrapped(&mesh, &Settings::default()).report.l2 < 1.001);
+        }
+    }
 }
 
 #[test]

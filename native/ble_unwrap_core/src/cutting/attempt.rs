@@ -11,7 +11,7 @@ use crate::progress::Cancelled;
 use crate::segmentation::{self, SpectralAnalysis};
 use crate::settings::{Holes, Moves, Settings};
 
-use super::cost::{self, CutPrice};
+use super::cost::{self, CutPrice, Price};
 use super::measured::{Measured, analyse};
 use super::moves::dart::Bulging;
 use super::moves::net;
@@ -172,6 +172,24 @@ impl<'a> Attempt<'a> {
         let patch = self.patch();
         let length = |h| CutPrice::new(self.settings).of(&patch.mesh, h);
         patch.cut(&charts::cut_to_disk(&patch.mesh, length, |h| patch.is_diagonal(h)))
+    }
+
+    /// A thin ring as a straight strip, if its straight borders are worth the stretch.
+    pub(super) fn strip(&self, price: &Price, rungs: &mut Rungs) -> Option<Chart> {
+        let is_ring = self.topology.loops == 2 && self.topology.genus() == 0;
+        if !is_ring || self.settings.moves != Moves::All || cost::may_bend(self.settings.stretch_price) {
+            return None;
+        }
+        let open = self.cut_to_disk();
+        let (flat, along) = flattening::strip(self.patch(), &open)?;
+        let (l2, chart) = (flat.l2, flat.into_chart(open));
+        let round = Chart { l2: 1.0, ..chart.clone() };
+        if l2 > self.settings.stretch_limit || !price.is_worth_straightening(&round, l2, along) {
+            return None;
+        }
+        rungs.take(Rung::CutOpen);
+        rungs.take(Rung::Straighten);
+        Some(chart)
     }
 
     /// The wall of a tube or the like, which lies flat once it is cut from one hole to the other.

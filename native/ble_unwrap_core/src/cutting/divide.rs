@@ -108,6 +108,9 @@ fn step(
     if patch.is_one_polygon() {
         return Ok(Outcome::Made(attempt.polygon(rungs)?));
     }
+    if let Some(strip) = attempt.strip(price, rungs) {
+        return Ok(Outcome::Made(strip));
+    }
     if let Some(chart) = attempt.run(rungs)? {
         return Ok(Outcome::Made(chart));
     }

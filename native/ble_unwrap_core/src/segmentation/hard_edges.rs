@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use crate::mesh::{HalfedgeId, TriMesh, VertexId, measure};
 
 use super::Segmentation;
+use super::walls;
 
 /// Normals of two faces on a hard edge are at least so many degrees apart: the sides of a hexagonal nut are 60°, those of
 /// an octagonal tube 45°, which is meant to be round.
@@ -17,14 +18,14 @@ const HARD_OF_MANUFACTURED: f64 = 40.0;
 const MOST_CURVED: f64 = 0.5;
 /// Parts have at least so many triangles on average. With fewer they are the facets of a crystal or of crumpled paper, and distances tell better
 /// which of them belong together.
-const LEAST_FACES: usize = 6;
+pub(super) const LEAST_FACES: usize = 6;
 /// A thing is manufactured if parts that unroll have at least this share of its area; then all of them are kept. With a half in its place a
 /// table with barrels and bottles on it has twice as much seam, and a fan disk 1.4 times.
 const LEAST_SHARE: f64 = 0.8;
 /// Of other things, plane parts of at least this share of the area are parts: the caps of a barrel, the base of a bust.
-const LEAST_PLANE: f64 = 0.05;
+pub(super) const LEAST_PLANE: f64 = 0.05;
 /// Normals of a plane part are at most so many degrees from their mean.
-const MOST_LEANING: f64 = 3.0;
+pub(super) const MOST_LEANING: f64 = 3.0;
 
 /// The parts between the hard edges of a thing that unroll without stretch: a number from 1 on for each face, and 0 for
 /// faces that are in none. Empty where there are no such parts or the whole is one. Of what is not known to be manufactured, parts count
@@ -34,14 +35,18 @@ pub(crate) fn unrolling_parts(mesh: &TriMesh, polygon: &[u32], is_manufactured: 
         return Vec::new();
     }
     let (normals, areas) = (measure::face_normals(mesh), measure::face_areas(mesh));
-    let least = if is_manufactured { HARD_OF_MANUFACTURED } else { HARD }.to_radians().cos();
-    let is_hard = |h: HalfedgeId| {
-        let (f, g) = (h.face().index(), mesh.twin(h).face().index());
-        // A face without area has no normal, and no edge of it is hard.
-        areas[f].min(areas[g]) > 0.0 && polygon[f] != polygon[g] && normals[f].dot(&normals[g]) <= least
+    let is_hard = |degrees: f64| {
+        let least = degrees.to_radians().cos();
+        let (normals, areas) = (&normals, &areas);
+        move |h: HalfedgeId| {
+            let (f, g) = (h.face().index(), mesh.twin(h).face().index());
+            // A face without area has no normal, and no edge of it is hard.
+            areas[f].min(areas[g]) > 0.0 && polygon[f] != polygon[g] && normals[f].dot(&normals[g]) <= least
+        }
     };
-    let (part, parts) = connected(mesh, |h| !is_hard(h));
-    if parts < 2 || areas.iter().all(|area| *area <= 0.0) {
+    let is_edge = is_hard(if is_manufactured { HARD_OF_MANUFACTURED } else { HARD });
+    let (part, parts) = connected(mesh, |h| !is_edge(h));
+    if areas.iter().all(|area| *area <= 0.0) {
         return Vec::new();
     }
     let mut area = vec![0.0; parts];
@@ -49,7 +54,15 @@ pub(crate) fn unrolling_parts(mesh: &TriMesh, polygon: &[u32], is_manufactured: 
     let total: f64 = area.iter().sum();
     let unrolls = unrolling(mesh, &part, parts);
     let unrolled: f64 = (0..parts).filter(|&p| unrolls[p]).map(|p| area[p]).sum();
-    let are_parts = parts * LEAST_FACES <= mesh.face_count() && unrolled >= LEAST_SHARE * total;
+    let is_fine = is_manufactured || parts * LEAST_FACES <= mesh.face_count();
+    let are_parts = parts > 1 && is_fine && unrolled >= LEAST_SHARE * total;
+    let divides = is_hard(HARD);
+    if !are_parts && let Some(found) = walls::planes_and_walls(mesh, polygon, &normals, &areas, &divides) {
+        return found;
+    }
+    if parts < 2 {
+        return Vec::new();
+    }
     let is_taken: Vec<bool> = if is_manufactured || are_parts {
         unrolls
     } else {
@@ -135,33 +148,43 @@ fn plane(normals: &[Vector3<f64>], areas: &[f64], part: &[u32], parts: usize) ->
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::mesh::test_surfaces;
     use nalgebra::{Point3, Rotation3, Vector3};
     use std::f64::consts::TAU;
 
-    /// A body of revolution around z: quads between rings of a profile of (radius, height), caps of one polygon at both ends. Its
-    /// polygons are named in the second list.
-    fn turned(sides: usize, profile: &[[f64; 2]]) -> (TriMesh, Vec<u32>) {
+    /// Rings of some sides around z, one for each (radius, height).
+    fn rings(sides: usize, profile: &[[f64; 2]]) -> Vec<Point3<f64>> {
         let ring = |[r, z]: [f64; 2]| {
             (0..sides).map(move |k| {
                 let (s, c) = (TAU * k as f64 / sides as f64).sin_cos();
                 Point3::new(r * c, r * s, z)
             })
         };
-        let positions: Vec<Point3<f64>> = profile.iter().flat_map(|&p| ring(p)).collect();
+        profile.iter().flat_map(|&p| ring(p)).collect()
+    }
+
+    /// Two triangles for each quad between two rings, and its number for both.
+    fn between_rings(sides: usize, [low, high]: [usize; 2], triangles: &mut Vec<[u32; 3]>, polygon: &mut Vec<u32>) {
+        let at = |row: usize, k: usize| (row * sides + k % sides) as u32;
+        for k in 0..sides {
+            let [a, b, c, d] = [at(low, k), at(low, k + 1), at(high, k + 1), at(high, k)];
+            polygon.extend([triangles.len() as u32 / 2; 2]);
+            triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+
+    /// A body of revolution around z: quads between rings of a profile of (radius, height), caps of one polygon at both ends. Its
+    /// polygons are named in the second list.
+    pub(crate) fn turned(sides: usize, profile: &[[f64; 2]]) -> (TriMesh, Vec<u32>) {
+        let positions = rings(sides, profile);
         let at = |row: usize, k: usize| (row * sides + k % sides) as u32;
         let (mut triangles, mut polygon) = (Vec::new(), Vec::new());
-        let mut count = 0;
         for row in 0..profile.len() - 1 {
-            for k in 0..sides {
-                let [a, b, c, d] = [at(row, k), at(row, k + 1), at(row + 1, k + 1), at(row + 1, k)];
-                triangles.extend([[a, b, c], [a, c, d]]);
-                polygon.extend([count, count]);
-                count += 1;
-            }
+            between_rings(sides, [row, row + 1], &mut triangles, &mut polygon);
         }
+        let mut count = triangles.len() as u32 / 2;
         for (row, turn) in [(0, true), (profile.len() - 1, false)] {
             for k in 1..sides - 1 {
                 let [a, b, c] = [at(row, 0), at(row, k), at(row, k + 1)];
@@ -173,7 +196,17 @@ mod tests {
         (test_surfaces::mesh(&positions, &triangles), polygon)
     }
 
-    fn moved(mesh: &TriMesh) -> TriMesh {
+    /// The same of a profile that is closed, without caps.
+    pub(crate) fn tube(sides: usize, profile: &[[f64; 2]]) -> (TriMesh, Vec<u32>) {
+        let positions = rings(sides, profile);
+        let (mut triangles, mut polygon) = (Vec::new(), Vec::new());
+        for row in 0..profile.len() {
+            between_rings(sides, [row, (row + 1) % profile.len()], &mut triangles, &mut polygon);
+        }
+        (test_surfaces::mesh(&positions, &triangles), polygon)
+    }
+
+    pub(crate) fn moved(mesh: &TriMesh) -> TriMesh {
         let turn = Rotation3::new(Vector3::new(0.3, -1.1, 0.7));
         let positions: Vec<Point3<f64>> = mesh.positions().iter().map(|p| turn * p * 1e-3).collect();
         let triangles: Vec<[u32; 3]> = mesh.triangles().iter().map(|t| t.map(|v| v.index() as u32)).collect();
@@ -181,7 +214,7 @@ mod tests {
     }
 
     /// How many parts a mesh comes apart into, and whether a face is in one that unrolls.
-    fn parts(mesh: &TriMesh, polygon: &[u32], is_manufactured: bool) -> (usize, Vec<bool>) {
+    pub(crate) fn parts(mesh: &TriMesh, polygon: &[u32], is_manufactured: bool) -> (usize, Vec<bool>) {
         let part = unrolling_parts(mesh, polygon, is_manufactured);
         let unrolls = mesh.faces().map(|f| part.get(f.index()).is_some_and(|p| *p != 0)).collect();
         let mesh = mesh.clone().with_parts(part);

@@ -27,6 +27,7 @@ mod repair;
 mod smooth;
 mod spectral;
 mod straighten;
+mod walls;
 
 use crate::geodesics::LandmarkDistances;
 use crate::mesh::TriMesh;

@@ -125,7 +125,8 @@ choices!(Symmetry {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Style {
-    /// Each connected piece is judged by itself: if most of it unrolls between hard edges, all such parts keep their shape, else large planes do.
+    /// Each connected piece is judged by itself. If most of it unrolls between hard edges, all such parts keep their shape; if most of it is
+    /// planes, and walls that stand on them, with bevels between, these do, and bevels go with the planes; else large planes between hard edges do.
     Auto,
     /// The mesh has grown, and hard edges are not treated specially.
     Organic,
@@ -134,7 +135,7 @@ pub enum Style {
 }
 
 choices!(Style {
-    Auto: "auto", "Auto", "Parts between hard edges that can lie flat without stretch do so, if most of a connected piece is made of them; else only its large planes do.";
+    Auto: "auto", "Auto", "Parts between hard edges that can lie flat without stretch do so if most of a connected piece is made of them, and so do planes and walls between bevels; else only large planes do.";
     Organic: "organic", "Organic", "Hard edges are not treated specially.";
     Hard: "hard", "Hard Surface", "All such parts lie flat without stretch, whatever the piece is made of, and edges count as hard from 40° instead of 50°.";
 });
@@ -239,7 +240,8 @@ pub struct Settings {
     pub style: Style,
     /// How much seam a straight side is worth that lies along an axis of the texture: where the border of a chart runs straight on the surface
     /// between two corners, it is made straight in the chart, and laid along an axis, if that costs less in stretch than so many times its
-    /// length costs as seam. Has an effect only with all `moves`, and none where `stretch_price` is 0.
+    /// length costs as seam. On the same condition thin rings, as the rim of a hoop, are opened and become strips. Has an effect only with all
+    /// `moves`, and none where `stretch_price` is 0.
     pub straighten: f64,
     /// What happens to the holes of charts.
     pub holes: Holes,

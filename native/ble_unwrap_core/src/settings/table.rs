@@ -393,7 +393,7 @@ pub static TABLE: &[Setting] = &[
         "Whether planes, cylinders and the like between hard edges keep their shape."),
     row("straighten", "Straighten", Group::Charts, Kind::Real(|s| &mut s.straighten, Interval::closed(0.0, 10.0)), "",
         "How much seam a straight side along an axis of the texture is worth. Sides of charts that are straight on the surface are made \
-         straight where that costs less in stretch; 0 leaves them as they are."),
+         straight, and thin rings become strips, where that costs less in stretch; 0 leaves them as they are."),
     row("moves", "Moves", Group::Charts, Kind::Choice(|s| &mut s.moves), "",
         "What the search for charts may do."),
     row("holes", "Holes", Group::Charts, Kind::Choice(|s| &mut s.holes), "",

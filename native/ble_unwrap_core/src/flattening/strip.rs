@@ -1,0 +1,113 @@
+//! A thin ring laid out as a straight strip.
+
+use nalgebra::Point2;
+
+use crate::charts::Patch;
+use crate::distortion::RestTriangle;
+use crate::mesh::HalfedgeId;
+use crate::stretch;
+
+use super::ladder::{Flat, Positions, l2};
+
+/// The shorter border of a thin ring is at least so many times as long as the other: the rim of a hoop, not a washer.
+const THIN: f64 = 0.75;
+
+/// A thin ring that was cut open from one of its borders to the other as a rectangle: the rim of a cup, the side of a coin. Its borders and
+/// the two sides of the cut become straight, and points on them keep their distances but for a factor. `ring` is the patch before the cut.
+/// The length of the borders comes with it. `None` for what is no thin ring, and where a vertex lies between the borders.
+pub(crate) fn strip(ring: &Patch, open: &Patch) -> Option<(Flat, f64)> {
+    let mesh = &open.mesh;
+    let loops = mesh.boundary_loops();
+    if loops.len() != 1 || loops.group(0).len() != mesh.vertex_count() {
+        return None;
+    }
+    // A cut keeps the numbers of faces, and so those of half-edges.
+    let is_cut = |h: HalfedgeId| !ring.mesh.is_boundary(h);
+    let mut outline = loops.group(0).to_vec();
+    let corner = (0..outline.len())
+        .find(|&k| !is_cut(outline[k]) && is_cut(outline[(k + outline.len() - 1) % outline.len()]))?;
+    outline.rotate_left(corner);
+    let sides: Vec<&[HalfedgeId]> = outline.chunk_by(|a, b| is_cut(*a) == is_cut(*b)).collect();
+    let [low, _, high, _] = sides[..] else { return None };
+    let length = |side: &[HalfedgeId]| side.iter().map(|&h| mesh.edge_length(h)).sum::<f64>();
+    let borders = [length(low), length(high)];
+    let along = borders[0] + borders[1];
+    let long = 0.5 * along;
+    if borders[0].min(borders[1]) < THIN * borders[0].max(borders[1]) {
+        return None;
+    }
+    let wide = open.area() / long;
+    let corners = [[0.0, 0.0], [long, 0.0], [long, wide], [0.0, wide]].map(Point2::from);
+    let mut uv: Positions = vec![Point2::origin(); mesh.vertex_count()];
+    for (k, side) in sides.iter().enumerate() {
+        let (from, to) = (corners[k], corners[(k + 1) % 4]);
+        let (whole, mut gone) = (length(side), 0.0);
+        for &h in *side {
+            uv[mesh.from(h).index()] = from + (to - from) * (gone / whole);
+            gone += mesh.edge_length(h);
+        }
+    }
+    if !uv.iter().all(|p| p.x.is_finite() && p.y.is_finite()) || stretch::first_flip(mesh, &uv).is_some() {
+        return None;
+    }
+    let l2 = l2(open, &RestTriangle::of_mesh(mesh), &uv);
+    Some((Flat { uv, l2 }, along))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::charts;
+    use crate::mesh::test_surfaces;
+    use nalgebra::Point3;
+
+    /// A flat ring of quads between circles of some radii, and the same cut open.
+    fn ring(radii: &[f64]) -> [Patch; 2] {
+        const SIDES: usize = 24;
+        let at = |row: usize, k: usize| (row * SIDES + k % SIDES) as u32;
+        let place = |r: f64| {
+            (0..SIDES)
+                .map(move |k| (TAU * k as f64 / SIDES as f64).sin_cos())
+                .map(move |(s, c)| Point3::new(r * c, r * s, 0.0))
+        };
+        let positions: Vec<Point3<f64>> = radii.iter().flat_map(|&r| place(r)).collect();
+        let quads = (1..radii.len())
+            .flat_map(|row| (0..SIDES).map(move |k| [at(row, k), at(row, k + 1), at(row - 1, k + 1), at(row - 1, k)]));
+        let triangles: Vec<[u32; 3]> = quads.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let mesh = test_surfaces::mesh(&positions, &triangles);
+        let polygon = (0..mesh.face_count() as u32).map(|f| f / 2).collect();
+        let whole = Patch::whole(Arc::new(mesh), polygon);
+        let cut = charts::cut_to_disk(&whole.mesh, |h| whole.mesh.edge_length(h), |h| whole.is_diagonal(h));
+        let open = whole.cut(&cut);
+        [whole, open]
+    }
+
+    #[test]
+    fn a_thin_ring_is_a_rectangle_of_its_area() {
+        let [whole, open] = ring(&[1.0, 0.9]);
+        let (flat, along) = strip(&whole, &open).expect("a strip");
+        let (mut low, mut high) = (flat.uv[0], flat.uv[0]);
+        for p in &flat.uv {
+            (low, high) = (low.inf(p), high.sup(p));
+        }
+        let [long, wide] = [high.x - low.x, high.y - low.y];
+        assert!((long * wide - whole.area()).abs() < 1e-9 && (long - 0.5 * along).abs() < 1e-9);
+        assert!((along - whole.mesh.boundary_length()).abs() < 1e-9);
+        let on_edge = |x: f64, low: f64, high: f64| (x - low).min(high - x).abs() < 1e-9;
+        assert!(flat.uv.iter().all(|p| on_edge(p.x, low.x, high.x) || on_edge(p.y, low.y, high.y)));
+        assert!(flat.l2 > 1.0 && flat.l2 < 1.02, "{}", flat.l2);
+    }
+
+    #[test]
+    fn what_is_wide_or_has_vertices_inside_is_none() {
+        let [whole, open] = ring(&[1.0, 0.7]);
+        assert!(strip(&whole, &open).is_none(), "wide");
+        let [whole, open] = ring(&[1.0, 0.95, 0.9]);
+        assert!(strip(&whole, &open).is_none(), "a vertex lies between the borders");
+        let [whole, _] = ring(&[1.0, 0.9]);
+        assert!(strip(&whole, &whole).is_none(), "not cut");
+    }
+}
