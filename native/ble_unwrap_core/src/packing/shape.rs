@@ -34,9 +34,14 @@ impl Scale {
     /// At `density` texels to a unit of the chart plane, on cells of `cell` texels.
     pub(super) fn new(outline: &Outline, density: f64, cell: f64) -> Self {
         let extent = density * outline.extent;
+        let is_speck = outline.extent > 0.0 && extent < SPECK_TEXELS && !outline.keeps_size;
         // A chart without extent is a point at any scale.
-        let cells = if outline.extent == 0.0 { density } else { extent.max(SPECK_TEXELS) } / cell;
-        Self { cells, is_speck: outline.extent > 0.0 && extent < SPECK_TEXELS }
+        let texels = match outline.extent {
+            0.0 => density,
+            _ if is_speck => SPECK_TEXELS,
+            _ => extent,
+        };
+        Self { cells: texels / cell, is_speck }
     }
 }
 
