@@ -195,6 +195,7 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
         fn cells_near_a_triangle_are_taken_wherever_it_lies(
             corners in prop::array::uniform3((-60.0f64..160.0, -60.0f64..120.0)),

@@ -33,15 +33,20 @@ pub(super) struct Scale {
 impl Scale {
     /// At `density` texels to a unit of the chart plane, on cells of `cell` texels.
     pub(super) fn new(outline: &Outline, density: f64, cell: f64) -> Self {
-        let extent = density * outline.extent;
-        let is_speck = outline.extent > 0.0 && extent < SPECK_TEXELS && !outline.keeps_size;
+        Self::of(outline.extent, outline.keeps_size, density, cell)
+    }
+
+    /// The same for an outline of an extent in units of the chart plane.
+    pub(super) fn of(extent: f64, keeps_size: bool, density: f64, cell: f64) -> Self {
+        let texels = density * extent;
+        let is_speck = extent > 0.0 && texels < SPECK_TEXELS && !keeps_size;
         // A chart without extent is a point at any scale.
-        let texels = match outline.extent {
+        let drawn = match extent {
             0.0 => density,
             _ if is_speck => SPECK_TEXELS,
-            _ => extent,
+            _ => texels,
         };
-        Self { cells: texels / cell, is_speck }
+        Self { cells: drawn / cell, is_speck }
     }
 }
 

@@ -30,6 +30,9 @@ struct Crate {
     low: [f64; 2],
     /// Width and height, in outline units.
     size: [f64; 2],
+    /// Extent of the chart, in units of its plane, and whether it keeps its size: what its scale depends on.
+    extent: f64,
+    keeps_size: bool,
 }
 
 /// Charts as boxes, in the order in which they are placed.
@@ -66,17 +69,22 @@ impl<'a> Shelves<'a> {
         progress: &'a Progress,
     ) -> Result<Self, Cancelled> {
         let boxed = |&i: &usize| {
+            progress.check()?;
             let outline = &outlines[i];
             let turn = turns[i].first().copied().unwrap_or([1.0, 0.0]);
             let given = Crate::new(i, outline, turn);
             let laid_down = || Crate::new(i, outline, [-turn[1], turn[0]]);
-            if quarters && given.size[1] > given.size[0] { laid_down() } else { given }
+            let lies = if quarters && given.size[1] > given.size[0] { laid_down() } else { given };
+            Ok(lies)
         };
-        let mut crates: Vec<Crate> = of.par_iter().map(boxed).collect();
+        let boxes: Vec<Crate> = of.par_iter().map(boxed).collect::<Result<_, Cancelled>>()?;
+        // By height, ties by number: no two are equal, so the order is one. Only heights and places are moved about.
+        let height = |(at, c): (usize, &Crate)| (c.size[1] * outlines[c.chart as usize].unit(), at);
+        let mut order: Vec<(f64, usize)> = boxes.par_iter().enumerate().map(height).collect();
         progress.check()?;
-        let extent = |c: &Crate| c.size[1] * outlines[c.chart as usize].unit();
-        crates.par_sort_by(|a, b| extent(b).total_cmp(&extent(a)).then(a.chart.cmp(&b.chart)));
+        order.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         progress.check()?;
+        let crates = order.into_iter().map(|(_, at)| boxes[at]).collect();
         Ok(Self { outlines, crates, grid, gap: margin + 2.0 * SAFETY_TEXELS, progress })
     }
 
@@ -115,7 +123,7 @@ impl<'a> Shelves<'a> {
             if number.is_multiple_of(BETWEEN_CHECKS) {
                 self.progress.check()?;
             }
-            let scale = Scale::new(&self.outlines[c.chart as usize], density, 1.0);
+            let scale = Scale::of(c.extent, c.keeps_size, density, 1.0);
             let size = c.size.map(|side| side * scale.cells);
             let on_this = if size[1] <= height { shelf.take(size[0], self.gap) } else { None };
             let corner = match on_this {
@@ -158,7 +166,14 @@ impl Crate {
                 (low[k], high[k]) = (low[k].min(x), high[k].max(x));
             }
         }
-        Self { chart: chart as u32, turn: [c, s], low, size: [0, 1].map(|k| high[k] - low[k]) }
+        Self {
+            chart: chart as u32,
+            turn: [c, s],
+            low,
+            size: [0, 1].map(|k| high[k] - low[k]),
+            extent: outline.extent,
+            keeps_size: outline.keeps_size,
+        }
     }
 }
 
