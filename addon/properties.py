@@ -63,6 +63,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     texture_size: declared("texture_size", soft_min=256, soft_max=8192)
     margin: declared("margin", soft_max=32.0, step=50, precision=1, subtype="PIXEL")
     rotation: declared("rotation")
+    quality: declared("quality")
     use_seams: BoolProperty(
         name="Cut at Seams",
         description=(
@@ -234,6 +235,7 @@ ADVANCED_SETTINGS = (
     ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max", "together_max")),
     ("Embedding", ("model", "kernel_width", "relaxation", "max_sweeps", "tolerance", "update", "initial")),
     ("Stretch", ("stretch_solver", "stretch_iterations")),
+    ("Packing", ("quality",)),
 )
 
 

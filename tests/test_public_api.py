@@ -25,6 +25,7 @@ BUILT_BY_CALLERS = {
     "PackSettings",
     "EmbedOptions",
     "CloudDistanceSettings",
+    "RepackRules",
     "FittedLandmarks",
 }
 KNOWN_TO_HOSTS_IN_FULL = {"ErrorKind", "Setting", "Kind", "Value", "Interval", "Argument", "Named"}

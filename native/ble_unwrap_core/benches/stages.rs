@@ -2,7 +2,7 @@
 
 use ble_unwrap_core::internals::{Body, Distances, Layout, Sheet};
 use ble_unwrap_core::settings::PackSettings;
-use ble_unwrap_core::standalone::repack;
+use ble_unwrap_core::standalone::{RepackRules, repack};
 use ble_unwrap_core::{Atlas, MeshInput, Progress, Settings, unwrap};
 use ble_unwrap_fixtures::{FlatPolygons, PolyMesh};
 use criterion::measurement::WallTime;
@@ -308,8 +308,16 @@ fn packing(criterion: &mut Criterion, one: &ThreadPool) {
             charts,
             || blobs(charts),
             |blobs| {
-                repack(&blobs.points, &blobs.triangles, &blobs.chart, &PackSettings::default(), &Progress::new())
-                    .expect("charts that fit")
+                let rules = RepackRules::default();
+                repack(
+                    &blobs.points,
+                    &blobs.triangles,
+                    &blobs.chart,
+                    &rules,
+                    &PackSettings::default(),
+                    &Progress::new(),
+                )
+                .expect("charts that fit")
             },
             |_, packed| packed.charts == charts && packed.specks == 0 && packed.efficiency > 0.25,
         );

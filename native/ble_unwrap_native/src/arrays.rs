@@ -22,6 +22,7 @@ pub(crate) struct Argument {
 
 const REALS: &str = "a float32 or float64";
 const INDICES: &str = "an int32 or int64";
+const FLAGS: &str = "a bool";
 
 /// Rows of `N` real numbers, from float32 or float64 of shape (n, `N`).
 pub(crate) fn real_rows<const N: usize>(object: &Bound<'_, PyAny>, argument: Argument) -> PyResult<Vec<[f64; N]>> {
@@ -79,6 +80,20 @@ pub(crate) fn indices(object: &Bound<'_, PyAny>, argument: Argument) -> PyResult
     Ok(values)
 }
 
+/// Yes or no, from bool of shape (n,).
+pub(crate) fn flags(object: &Bound<'_, PyAny>, argument: Argument) -> PyResult<Vec<bool>> {
+    let view = View::new(object, argument, FLAGS)?;
+    if view.shape.len() != 1 {
+        return Err(view.refusal());
+    }
+    let mut values = view.reserve(view.rows())?;
+    for i in 0..view.rows() {
+        // Any byte but 0 counts as true.
+        values.push(view.read::<u8>([i, 0]) != 0);
+    }
+    Ok(values)
+}
+
 /// Rows of `N` indices, from int32 or int64 of shape (n, `N`); an int64 must fit 32 bits.
 pub(crate) fn index_rows<const N: usize>(object: &Bound<'_, PyAny>, argument: Argument) -> PyResult<Vec<[i32; N]>> {
     let view = View::new(object, argument, INDICES)?;
@@ -110,11 +125,17 @@ enum Scalar {
     I64,
     U32,
     U64,
+    Bool,
 }
 
 impl Scalar {
-    fn is_real(self) -> bool {
-        matches!(self, Self::F32 | Self::F64)
+    /// Whether a number of this type is what an argument of the given description expects.
+    fn is(self, expected: &str) -> bool {
+        match self {
+            Self::F32 | Self::F64 => expected == REALS,
+            Self::Bool => expected == FLAGS,
+            Self::I32 | Self::I64 | Self::U32 | Self::U64 => expected == INDICES,
+        }
     }
 }
 
@@ -142,7 +163,7 @@ impl<'py> View<'py> {
                 type_name(object)
             ))
         })?;
-        let scalar = scalar_of(&buffer).filter(|s| s.is_real() == (expected == REALS));
+        let scalar = scalar_of(&buffer).filter(|s| s.is(expected));
         let dimensions = buffer.dimensions();
         let (Some(scalar), 1..=2, None) = (scalar, dimensions, buffer.suboffsets()) else {
             return Err(refusal(object, &buffer, argument, expected));
@@ -227,6 +248,7 @@ fn scalar_of(buffer: &PyUntypedBuffer) -> Option<Scalar> {
         ElementType::SignedInteger { bytes: 8 } => (Scalar::I64, 8),
         ElementType::UnsignedInteger { bytes: 4 } => (Scalar::U32, 4),
         ElementType::UnsignedInteger { bytes: 8 } => (Scalar::U64, 8),
+        ElementType::Bool => (Scalar::Bool, 1),
         _ => return None,
     };
     (buffer.item_size() == bytes).then_some(scalar)

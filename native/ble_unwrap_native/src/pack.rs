@@ -1,7 +1,7 @@
 //! `pack`.
 
 use ble_unwrap_core::settings::Function;
-use ble_unwrap_core::standalone::repack;
+use ble_unwrap_core::standalone::{RepackRules, RepackScale, repack};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -46,11 +46,23 @@ impl PackedCharts {
 /// Parameters
 /// ----------
 /// points : (n, 2) float32 or float64
-///     Points of the charts, in any unit.
+///     Points of the charts, in any unit; of obstacles, UVs.
 /// triangles : (t, 3) int32 or int64
 ///     Three points each.
 /// chart : (t,) int32 or int64
 ///     The chart of each triangle. Triangles of a negative chart are left out. A point belongs to one chart.
+/// groups : (t,) int32 or int64, optional
+///     A number for each triangle, the same for all triangles of a chart. Charts with the same number, 0 or more, move as one rigid whole: they
+///     keep their places relative to each other, overlap as they did, and keep no margin between them. Copies that lie upon each other stay a
+///     stack if they are of one group. Charts with a negative number move by themselves.
+/// obstacles : (t,) bool, optional
+///     Triangles whose chart or group stays where it is. The points of what stays are UVs, and are returned as they are, in single precision.
+///     They may lie outside the texture.
+/// border_margin : float, optional
+///     Least distance of charts that move to the border of the texture, in texels; half of ``margin`` if absent.
+/// scale : {"uniform", "fixed"}
+///     ``"uniform"``: all charts are scaled by the same factor, the greatest found. ``"fixed"``: charts keep their size; a unit of the points is
+///     the width of the texture, along both sides.
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
 /// margin : float
@@ -59,6 +71,8 @@ impl PackedCharts {
 ///     Width and height of the texture in texels. Charts keep their shape in texels.
 /// rotation : {"aligned", "any", "quarter", "none"}
 ///     How charts may be turned. They are never mirrored.
+/// quality : {"fast", "normal", "high"}
+///     How long a dense placement is searched for.
 /// threads : int
 ///     Threads to work with; 0 for as many as the machine has. The result does not depend on it.
 ///
@@ -71,20 +85,28 @@ impl PackedCharts {
 /// ------
 /// InvalidArgumentError
 ///     If an array has the wrong type, shape or indices, a setting is unknown or out of range, or the charts do not fit
-///     with their margin.
+///     with their margin; with ``scale="fixed"`` the text tells the factor at which they would.
 /// Cancelled
 ///     If the job was cancelled.
 ///
 /// Notes
 /// -----
-/// All charts are scaled by the same factor, specks aside. Charts that overlap themselves are packed as they are.
+/// All charts are scaled by the same factor, specks aside, which are enlarged to about a texel unless the scale is fixed; a group is one in
+/// this. Charts that overlap themselves are packed as they are. Charts keep their shape in texels: if the texture is not square, multiply the
+/// ``v`` of UVs that are to be moved by its height over its width first.
 #[pyfunction]
-#[pyo3(signature = (points, triangles, chart, *, job=None, **settings))]
+#[pyo3(signature = (points, triangles, chart, *, groups=None, obstacles=None, border_margin=None, scale=None, job=None, **settings),
+    text_signature = "(points, triangles, chart, *, groups=None, obstacles=None, border_margin=None, scale='uniform', job=None, **settings)")]
+#[expect(clippy::too_many_arguments, reason = "they are the keywords of a Python function")]
 pub(crate) fn pack(
     py: Python<'_>,
     points: &Bound<'_, PyAny>,
     triangles: &Bound<'_, PyAny>,
     chart: &Bound<'_, PyAny>,
+    groups: Option<&Bound<'_, PyAny>>,
+    obstacles: Option<&Bound<'_, PyAny>>,
+    border_margin: Option<&Bound<'_, PyAny>>,
+    scale: Option<&Bound<'_, PyAny>>,
     job: Option<Bound<'_, Job>>,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
@@ -92,11 +114,21 @@ pub(crate) fn pack(
     let points = arrays::real_rows(points, Argument { name: "points", shape: "(n, 2)" })?;
     let triangles = arrays::index_rows(triangles, Argument { name: "triangles", shape: "(t, 3)" })?;
     let chart = arrays::indices(chart, Argument { name: "chart", shape: "(t,)" })?;
+    let groups = groups.map(|given| arrays::indices(given, Argument { name: "groups", shape: "(t,)" })).transpose()?;
+    let obstacles =
+        obstacles.map(|given| arrays::flags(given, Argument { name: "obstacles", shape: "(t,)" })).transpose()?;
+    let border_texels = border_margin.map(|given| settings::number("border_margin", given)).transpose()?;
+    let scales = [("uniform", RepackScale::Uniform), ("fixed", RepackScale::Fixed)];
+    let scale = scale.map(|given| settings::one_of("scale", &scales, given)).transpose()?.unwrap_or_default();
     let size = (call.settings.packing.width, call.settings.packing.height);
     let job = Job::given_or_new(py, job)?;
     job.get().start(
         call.threads,
-        move |progress| repack(&points, &triangles, &chart, &call.settings.packing, progress).map_err(Failure::from),
+        move |progress| {
+            let (groups, obstacles) = (groups.as_deref(), obstacles.as_deref());
+            let rules = RepackRules { groups, obstacles, border_texels, scale };
+            repack(&points, &triangles, &chart, &rules, &call.settings.packing, progress).map_err(Failure::from)
+        },
         move |py, repacked| {
             let report = PyDict::new(py);
             report.set_item("charts", repacked.charts)?;

@@ -16,8 +16,8 @@ const RASTER: f64 = 512.0;
 const UPRIGHT: f64 = 0.9;
 
 /// The chart `which` of `outlines`, the only one with triangles and with an extent, as large as the
-/// texture allows, in its middle.
-pub(super) fn alone(outlines: &[Outline], which: usize, grid: Grid, settings: &PackSettings) -> Dense {
+/// texture allows, but with at most `most` texels to a unit of its plane, in the middle of the texture.
+pub(super) fn alone(outlines: &[Outline], which: usize, grid: Grid, most: f64, settings: &PackSettings) -> Dense {
     let outline = &outlines[which];
     let inner = grid.inner();
     let room = inner.map(|size| size - 2.0 * SAFETY_TEXELS);
@@ -41,6 +41,7 @@ pub(super) fn alone(outlines: &[Outline], which: usize, grid: Grid, settings: &P
         Rotation::Quarter => upright_or_lying([1.0, 0.0]),
     };
     let Fit { middle, scale } = fit(outline, turn, room);
+    let scale = scale.min(most * outline.unit());
     // The middle of the chart's box to the middle of the grid.
     let offset = |k: usize| 0.5 * inner[k] - scale * middle[k];
     let pose = Pose {
@@ -92,8 +93,8 @@ mod tests {
         for (width, height) in [(300, 300), (400, 90), (90, 400)] {
             for rotation in [Rotation::Aligned, Rotation::Any, Rotation::Quarter, Rotation::None] {
                 let settings = PackSettings { width, height, margin_texels: 3.0, rotation, ..PackSettings::default() };
-                let grid = Grid::new(&settings, 1).expect("room");
-                let dense = alone(std::slice::from_ref(&outline), 0, grid, &settings);
+                let grid = Grid::new(&settings, 1.5, 1);
+                let dense = alone(std::slice::from_ref(&outline), 0, grid, f64::INFINITY, &settings);
                 let pose = dense.places[0].expect("placed").pose;
                 let at = points.map(|p| pose.texel(p));
                 let least = at.iter().flat_map(|p| [p.x, p.y, f64::from(width) - p.x, f64::from(height) - p.y]);
@@ -107,5 +108,16 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_given_scale_is_kept_in_the_middle() {
+        let points = [[0.0, 0.0], [4.0, 0.0], [0.0, 1.0]].map(|[x, y]| Point2::new(x, y));
+        let outline = Outline::new(&PackItem { points: &points, triangles: &[[0, 1, 2]] }, 0).expect("valid");
+        let settings = PackSettings { width: 300, height: 300, margin_texels: 3.0, ..PackSettings::default() };
+        let dense = alone(std::slice::from_ref(&outline), 0, Grid::new(&settings, 1.5, 1), 10.0, &settings);
+        assert!((dense.density - 10.0).abs() < 1e-12);
+        let pose = dense.places[0].expect("placed").pose;
+        assert!((pose.offset - Vector2::repeat(150.0)).norm() < 1e-9);
     }
 }

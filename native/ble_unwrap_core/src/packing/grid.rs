@@ -1,9 +1,9 @@
 //! The search grid and where it lies on the texture.
 
-use nalgebra::Vector2;
+use nalgebra::{Point2, Vector2};
 
 use super::occupancy::Occupancy;
-use super::{PackError, PackSettings, Pose, Quality};
+use super::{PackSettings, Pose, Quality};
 
 /// Cells across the square each chart would have if all were equal: the raster then wastes about 2 %
 /// of the texture. Finer grids gain half of that for twice the time.
@@ -11,7 +11,7 @@ const CELLS_ACROSS: f64 = 70.0;
 /// Texels a cell at the finest.
 const FINEST: f64 = 0.25;
 
-/// Square cells over the texture, half a margin from its border; the rows run along its shorter
+/// Square cells over the texture, a given distance from its border; the rows run along its shorter
 /// side, because charts are piled up row by row and a tall pile wastes less at its top.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
@@ -29,20 +29,14 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Cells fine enough for `charts` charts; where there is a margin, a whole number of cells make it
-    /// unless that takes too many cells.
-    ///
-    /// # Errors
-    /// [`PackError::MarginTooLarge`] where less than a texel is left between the borders.
-    pub(super) fn new(settings: &PackSettings, charts: usize) -> Result<Self, PackError> {
+    /// Cells fine enough for `charts` charts, `border` texels from the border of the texture, where at least a texel is to be left between
+    /// the borders. Where there is a margin, a whole number of cells make it unless that takes too many cells.
+    pub(super) fn new(settings: &PackSettings, border: f64, charts: usize) -> Self {
         let (width, height) = (f64::from(settings.width), f64::from(settings.height));
         let (shorter, longer) = (width.min(height), width.max(height));
         let margin = settings.margin_texels;
-        if shorter - margin < 1.0 {
-            return Err(PackError::MarginTooLarge { margin, width: settings.width, height: settings.height });
-        }
         let (least, most) = match settings.quality {
-            Quality::Fast => (1024.0, 2048.0),
+            Quality::Fast | Quality::Normal => (1024.0, 2048.0),
             Quality::High => (2048.0, Occupancy::WIDEST as f64),
         };
         let across = (CELLS_ACROSS * (charts as f64).sqrt()).clamp(least, most);
@@ -52,33 +46,36 @@ impl Grid {
         } else {
             cell = margin.max(0.5 * cell);
         }
-        cell = cell.max(shorter / Occupancy::WIDEST as f64).min(shorter - margin);
-        let cells = |size: f64| (((size - margin) / cell + 1e-9).floor() as usize).max(1);
-        let (columns, rows) = (cells(shorter), cells(longer));
-        Ok(Self {
-            cell,
-            columns,
-            rows,
-            sideways: width > height,
-            border: 0.5 * margin,
-            inner: [shorter - margin, longer - margin],
-            height,
-        })
+        cell = cell.max(shorter / Occupancy::WIDEST as f64).min(shorter - 2.0 * border);
+        Self::of([shorter, longer], border, cell, width > height, height)
     }
 
-    /// About `across` cells along the longer side of the whole texture, border and all.
-    pub(super) fn coarse(settings: &PackSettings, across: f64) -> Self {
+    /// About `across` cells along the longer side of the texture. Charts are to be grown by half the margin: at a border of half the margin
+    /// they then may touch the border of the texture; where it is to be wider, the grid is smaller by the rest, else larger.
+    pub(super) fn coarse(settings: &PackSettings, border: f64, across: f64) -> Self {
         let (width, height) = (f64::from(settings.width), f64::from(settings.height));
         let (shorter, longer) = (width.min(height), width.max(height));
-        let cell = (longer / across).max(shorter / Occupancy::WIDEST as f64).min(shorter);
-        let cells = |size: f64| ((size / cell + 1e-9).floor() as usize).max(1);
-        let (columns, rows) = (cells(shorter), cells(longer));
-        Self { cell, columns, rows, sideways: width > height, border: 0.0, inner: [shorter, longer], height }
+        let rest = border - 0.5 * settings.margin_texels;
+        let cell = (longer / across).max((shorter - 2.0 * rest) / Occupancy::WIDEST as f64).min(shorter - 2.0 * rest);
+        Self::of([shorter, longer], rest, cell, width > height, height)
+    }
+
+    /// As many cells as there is room for between the borders of a texture whose sides are `shorter` and `longer`.
+    fn of([shorter, longer]: [f64; 2], border: f64, cell: f64, sideways: bool, height: f64) -> Self {
+        let inner = [shorter - 2.0 * border, longer - 2.0 * border];
+        let [columns, rows] = inner.map(|size| ((size / cell + 1e-9).floor() as usize).max(1));
+        Self { cell, columns, rows, sideways, border, inner, height }
     }
 
     /// Width and height in texels between the borders, in the grid's frame.
     pub(super) fn inner(self) -> [f64; 2] {
         self.inner
+    }
+
+    /// A point in texels of the texture as one in cells of the grid.
+    pub(super) fn cells_of(self, p: Point2<f64>) -> Point2<f64> {
+        let p = if self.sideways { Point2::new(self.height - p.y, p.x) } else { p };
+        p.map(|x| (x - self.border) / self.cell)
     }
 
     /// A pose in cells of the grid as a pose in texels of the texture.
@@ -104,7 +101,8 @@ mod tests {
     use super::*;
 
     fn grid(width: u32, height: u32, margin_texels: f64, charts: usize) -> Grid {
-        Grid::new(&PackSettings { width, height, margin_texels, ..PackSettings::default() }, charts).expect("room")
+        let settings = PackSettings { width, height, margin_texels, ..PackSettings::default() };
+        Grid::new(&settings, 0.5 * margin_texels, charts)
     }
 
     #[test]
@@ -132,6 +130,31 @@ mod tests {
                 let cells = margin / grid(size, size, margin, charts).cell;
                 assert!((cells - cells.round()).abs() < 1e-9, "{cells} cells make {margin} of {size}");
             }
+        }
+    }
+
+    #[test]
+    fn points_go_to_the_grid_and_back() {
+        for (width, height) in [(640, 480), (480, 640)] {
+            let grid = grid(width, height, 3.0, 10);
+            let p = Point2::new(100.0, 7.0);
+            let cells = grid.cells_of(p);
+            let pose = Pose { cos: 1.0, sin: 0.0, centre: Point2::origin(), scale: 1.0, offset: cells.coords };
+            let back = grid.to_texture(pose).offset;
+            assert!((back - p.coords).norm() < 1e-9, "{back:?}");
+        }
+    }
+
+    #[test]
+    fn another_border_leaves_as_much_room_on_every_grid() {
+        let settings = PackSettings { width: 1000, height: 600, margin_texels: 8.0, ..PackSettings::default() };
+        for border in [0.0, 4.0, 50.0] {
+            let room = [600.0 - 2.0 * border, 1000.0 - 2.0 * border];
+            let fine = Grid::new(&settings, border, 9);
+            assert_eq!(fine.inner(), room);
+            // Charts grown by half a margin are half a margin from the border of the coarse grid.
+            let coarse = Grid::coarse(&settings, border, 128.0).inner();
+            assert_eq!(coarse, room.map(|side| side + 8.0));
         }
     }
 }

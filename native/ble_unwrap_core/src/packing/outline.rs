@@ -25,6 +25,8 @@ pub(super) struct Outline {
     pub(super) centre: Point2<f64>,
     /// Larger extent of the bounding box, in the chart plane; 0 for a point or no triangle.
     pub(super) extent: f64,
+    /// Whether the chart is never enlarged, however small it is.
+    pub(super) keeps_size: bool,
 }
 
 /// A directed edge, its interior to the left, `winding` times.
@@ -56,7 +58,14 @@ impl Outline {
         }
         if item.triangles.is_empty() {
             let centre = Point2::origin();
-            return Ok(Self { points: Vec::new(), edges: Vec::new(), area: 0.0, centre, extent: 0.0 });
+            return Ok(Self {
+                points: Vec::new(),
+                edges: Vec::new(),
+                area: 0.0,
+                centre,
+                extent: 0.0,
+                keeps_size: false,
+            });
         }
         let size = high - low;
         let extent = size.x.max(size.y);
@@ -93,7 +102,7 @@ impl Outline {
                 edges.push(Edge { from, to, winding: winding.abs() });
             }
         }
-        Ok(Self { points, edges, area, centre, extent })
+        Ok(Self { points, edges, area, centre, extent, keeps_size: false })
     }
 
     /// The outline with its vertices moved together on a lattice of `step` units, which leaves far fewer

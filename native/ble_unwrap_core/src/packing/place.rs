@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use super::goal::Goal;
 use super::mask::Reach;
+use super::obstacles::Obstacles;
 use super::occupancy::Occupancy;
 use super::order::Strategy;
 use super::shape::{Footprint, Shape};
@@ -102,7 +103,20 @@ fn best_position(
     (best, first.unwrap_or(y))
 }
 
-/// Places shapes as a strategy says on an empty grid of `width` by `height` cells, `reach` apart.
+/// Where shapes are placed.
+#[derive(Clone, Copy)]
+pub(super) struct Site<'a> {
+    /// Width and height in cells.
+    pub(super) size: [usize; 2],
+    /// Which cells around a shape others keep away from.
+    pub(super) reach: &'a Reach,
+    /// What is there already.
+    pub(super) obstacles: Option<&'a Obstacles>,
+    /// Whether search rows are shared by similar footprints.
+    pub(super) alike: bool,
+}
+
+/// Places shapes on a site as a strategy says.
 ///
 /// Stops at the first that finds no place. Cost: about a lookup per word of free space and footprint.
 ///
@@ -111,11 +125,10 @@ fn best_position(
 pub(super) fn place(
     shapes: &[Shape],
     strategy: &Strategy,
-    [width, height]: [usize; 2],
-    reach: &Reach,
-    alike: bool,
+    site: Site<'_>,
     progress: &Progress,
 ) -> Result<Layout, Cancelled> {
+    let Site { size: [width, height], reach, obstacles, alike } = site;
     let order = strategy.order();
     // Highest level still asked about, from each place in the order on.
     let mut top_from = vec![0u32; order.len() + 1];
@@ -124,6 +137,9 @@ pub(super) fn place(
         top_from[k] = top_from[k + 1].max(top.unwrap_or(0));
     }
     let mut grid = Occupancy::new(width, height, top_from[0]);
+    if let Some(Obstacles { mask, frame, .. }) = obstacles {
+        grid.occupy(mask, -(*frame as isize), -(*frame as isize), top_from[0]);
+    }
     let mut layout = Layout { placed: vec![None; shapes.len()], rows: 0, missing: 0 };
     // Space only gets less: a footprint seen before has no place below the row where it last had one.
     let mut first_rows: HashMap<Kind, usize> = HashMap::new();

@@ -2,13 +2,14 @@
 
 use rayon::prelude::*;
 
+use super::PackError;
 use super::grid::Grid;
 use super::mask::Reach;
+use super::obstacles::Obstacles;
 use super::outline::Outline;
 use super::placement::{Dense, Place};
 use super::settle::{Ground, Piece, settle};
 use super::sketch::{Sketch, Spot};
-use super::{PackError, PackSettings};
 use crate::progress::{Cancelled, Progress};
 
 /// Half the side of the windows charts are looked for in first, in cells of the sketch.
@@ -21,6 +22,8 @@ const SHRINKS: u32 = 14;
 const BETTER: f64 = 1.002;
 /// Placements of a sketch from the first fit on.
 const GROWTHS: u32 = 5;
+/// The same between obstacles, where a sketch does not tell how much denser it may become.
+const GROWTHS_BETWEEN: u32 = 24;
 /// Least and greatest step of density while nothing was too dense.
 const STEPS: [f64; 2] = [1.002, 1.01];
 /// Densities this close to too dense are not improved on.
@@ -30,12 +33,14 @@ const CLOSE: f64 = 1.0005;
 pub(super) struct Refinement<'a> {
     pub(super) outlines: &'a [Outline],
     pub(super) grid: Grid,
-    reach: Reach,
+    pub(super) reach: &'a Reach,
+    /// What is in the way on the grid.
+    pub(super) obstacles: Option<&'a Obstacles>,
     /// Texels to a unit of the chart plane at most.
-    ceiling: f64,
+    pub(super) ceiling: f64,
     /// Placements made.
     pub(super) placements: u32,
-    progress: &'a Progress,
+    pub(super) progress: &'a Progress,
 }
 
 /// A placement that fits.
@@ -45,18 +50,7 @@ struct Fit {
     corners: Vec<Option<[usize; 2]>>,
 }
 
-impl<'a> Refinement<'a> {
-    pub(super) fn new(
-        outlines: &'a [Outline],
-        grid: Grid,
-        ceiling: f64,
-        settings: &PackSettings,
-        progress: &'a Progress,
-    ) -> Self {
-        let reach = Reach::new(settings.margin_texels / grid.cell);
-        Self { outlines, grid, reach, ceiling, placements: 0, progress }
-    }
-
+impl Refinement<'_> {
     /// The densest placement found near any of the sketches.
     ///
     /// # Errors
@@ -83,6 +77,9 @@ impl<'a> Refinement<'a> {
             let pieces = self.pieces(&spots, density)?;
             let height = self.grid.rows + self.grid.rows / OVERSHOOT;
             let mut ground = Ground::new(self.grid.columns, height, self.reach.clone());
+            if let Some(obstacles) = self.obstacles {
+                ground.obstruct(obstacles);
+            }
             let centres: Vec<[f64; 2]> = spots.iter().map(|s| s.map_or([0.0; 2], |s| self.cells(s.centre))).collect();
             let settled = settle(&pieces, &centres, &mut ground, window, self.progress)?;
             let used = settled.as_ref().map(|s| s.rows as f64 / self.grid.rows as f64);
@@ -101,7 +98,8 @@ impl<'a> Refinement<'a> {
             }
             if let Some(Fit { density: fitted, .. }) = &fit {
                 growths += 1;
-                if growths >= GROWTHS || too_dense < CLOSE * fitted || density >= self.ceiling {
+                let most = if self.obstacles.is_some() { GROWTHS_BETWEEN } else { GROWTHS };
+                if growths >= most || too_dense < CLOSE * fitted || density >= self.ceiling {
                     break;
                 }
                 density = denser(*fitted, too_dense, density, used).min(self.ceiling);

@@ -11,9 +11,11 @@ use rayon::prelude::*;
 use super::PackError;
 use super::grid::Grid;
 use super::mask::Reach;
+use super::obstacles::Obstacles;
 use super::order::Strategy;
 use super::outline::Outline;
-use super::place::{Layout, place};
+use super::place::{Layout, Site, place};
+use super::placement::{Dense, Place};
 use super::shape::Shape;
 use super::sketch::Sketch;
 use crate::progress::{Cancelled, Progress, Stage};
@@ -32,6 +34,9 @@ const STEP: f64 = 0.003;
 const LEAST_STEP: f64 = 0.0004;
 /// An attempt that uses the height to this share is a start for variations.
 const NEAR: f64 = 0.015;
+/// Between obstacles, densities are halved between the best that fitted and the least dense that did not as long as these differ by more than
+/// twice this share.
+const HALVED: f64 = 0.02;
 /// Rounds without a better fit before the step is halved.
 const PATIENCE: usize = 3;
 
@@ -41,6 +46,24 @@ pub(super) struct Best {
     pub(super) layout: Layout,
     /// Texels to a unit of the chart plane.
     pub(super) density: f64,
+}
+
+impl Best {
+    /// Where it has each chart in the texture.
+    pub(super) fn places(&self, grid: Grid) -> impl Iterator<Item = Option<Place>> {
+        self.shapes.iter().zip(&self.layout.placed).map(move |(shape, at)| {
+            at.map(|at| Place {
+                pose: grid.to_texture(shape.footprints[at.footprint].pose(at.x, at.y)),
+                touched: shape.cells as f64 * grid.cell * grid.cell,
+                is_speck: shape.is_speck,
+            })
+        })
+    }
+
+    /// All of it.
+    pub(super) fn dense(&self, grid: Grid) -> Dense {
+        Dense { places: self.places(grid).collect(), density: self.density }
+    }
 }
 
 /// What a search found.
@@ -64,6 +87,8 @@ pub(super) struct Search<'a> {
     pub(super) growth: f64,
     /// Which cells around a chart others keep away from.
     pub(super) reach: Reach,
+    /// What is in the way on the grid.
+    pub(super) obstacles: Option<Obstacles>,
     /// Attempts from the first fit on.
     pub(super) budget: usize,
     pub(super) progress: &'a Progress,
@@ -92,10 +117,12 @@ impl Search<'_> {
         let cap = rows + rows / 2;
         let cells: usize = shapes.iter().map(|s| s.cells).sum();
         let alike = shapes.len() >= MANY;
+        let obstacles = self.obstacles.as_ref();
+        let site = Site { size: [columns, cap], reach: &self.reach, obstacles, alike };
         let attempt = |strategy: Strategy| {
-            let layout = place(shapes, &strategy, [columns, cap], &self.reach, alike, self.progress)?;
+            let layout = place(shapes, &strategy, site, self.progress)?;
             let used = if layout.missing == 0 {
-                layout.rows as f64 / rows as f64
+                obstacles.map_or(layout.rows as f64 / rows as f64, |o| o.share(layout.rows))
             } else {
                 1.5 * cells as f64 / (cells - layout.missing).max(cells / 100 + 1) as f64
             };
@@ -144,7 +171,11 @@ impl Search<'_> {
             let count = strategies.len();
             all_made += count;
             let attempts = self.attempts(&shapes, strategies)?;
-            sketches.extend(attempts.iter().filter_map(|a| Sketch::of(&a.layout, &shapes, self.grid, density)));
+            let sketch = |a: &Attempt| match self.obstacles {
+                None => Sketch::of(&a.layout, &shapes, self.grid, density),
+                Some(_) => (a.used <= 1.0).then(|| Sketch::between_obstacles(&a.layout, &shapes, self.grid, density)),
+            };
+            sketches.extend(attempts.iter().filter_map(sketch));
             let Some(Attempt { used, layout, strategy }) = least(attempts) else { break };
             let loosened = 1.0 / used.sqrt();
             let before = density;
@@ -173,7 +204,13 @@ impl Search<'_> {
                 }
                 (step, idle) = ((0.5 * step).max(LEAST_STEP), 0);
                 too_dense = density;
-                let nearer = (fitted.density * density).sqrt().min(fitted.density * (1.0 + 4.0 * step));
+                let between = (fitted.density * density).sqrt();
+                let nearer = if self.obstacles.is_some() && between > fitted.density * (1.0 + HALVED) {
+                    // How much of the room is used tells little.
+                    between
+                } else {
+                    between.min(fitted.density * (1.0 + 4.0 * step))
+                };
                 density = nearer.max(fitted.density * (1.0 + LEAST_STEP));
                 lead = lead.map(|l| (f64::INFINITY, l.1));
             } else {

@@ -6,6 +6,7 @@
 
 use super::Pose;
 use super::mask::{Mask, Reach};
+use super::obstacles::Obstacles;
 use super::outline::Outline;
 use super::raster::rasterise;
 use super::shape::{SAFETY_TEXELS, Scale};
@@ -166,6 +167,12 @@ impl Ground {
         // Words beyond the last column are read by `meets`, never set.
         let empty = Mask::new(columns + 192, rows);
         Self { columns, rows, reach, taken: empty.clone(), reserved: empty }
+    }
+
+    /// Takes the cells of obstacles on the same grid.
+    pub(super) fn obstruct(&mut self, obstacles: &Obstacles) {
+        let corner = -(obstacles.frame as isize);
+        self.taken.paste(&obstacles.mask, corner, corner, self.columns);
     }
 
     fn reserve(&mut self, piece: &Piece, corner: [isize; 2]) {

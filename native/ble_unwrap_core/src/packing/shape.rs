@@ -33,10 +33,20 @@ pub(super) struct Scale {
 impl Scale {
     /// At `density` texels to a unit of the chart plane, on cells of `cell` texels.
     pub(super) fn new(outline: &Outline, density: f64, cell: f64) -> Self {
-        let extent = density * outline.extent;
+        Self::of(outline.extent, outline.keeps_size, density, cell)
+    }
+
+    /// The same for an outline of an extent in units of the chart plane.
+    pub(super) fn of(extent: f64, keeps_size: bool, density: f64, cell: f64) -> Self {
+        let texels = density * extent;
+        let is_speck = extent > 0.0 && texels < SPECK_TEXELS && !keeps_size;
         // A chart without extent is a point at any scale.
-        let cells = if outline.extent == 0.0 { density } else { extent.max(SPECK_TEXELS) } / cell;
-        Self { cells, is_speck: outline.extent > 0.0 && extent < SPECK_TEXELS }
+        let drawn = match extent {
+            0.0 => density,
+            _ if is_speck => SPECK_TEXELS,
+            _ => texels,
+        };
+        Self { cells: drawn / cell, is_speck }
     }
 }
 

@@ -47,17 +47,29 @@ impl Sketch {
         if layout.missing > 0 || !WORTHY.contains(&used) {
             return None;
         }
+        let mut sketch = Self::drawn(layout, shapes, grid, density / used.sqrt());
+        // What overshoots moves down with what it shrinks by.
+        sketch.spots.iter_mut().flatten().for_each(|spot| spot.centre[1] /= used.max(1.0));
+        Some(sketch)
+    }
+
+    /// The sketch an attempt at `density` made between obstacles, where it placed all charts below the top of the grid. How much of the
+    /// height it used says nothing there.
+    pub(super) fn between_obstacles(layout: &Layout, shapes: &[Shape], grid: Grid, density: f64) -> Self {
+        Self::drawn(layout, shapes, grid, density)
+    }
+
+    fn drawn(layout: &Layout, shapes: &[Shape], grid: Grid, density: f64) -> Self {
         let spot = |pose: Pose| {
-            let [x, y] = [0, 1].map(|k| pose.offset[k] * grid.cell + grid.border);
-            // What overshoots moves down with what it shrinks by.
-            Spot { turn: [pose.cos, pose.sin], centre: [x, y / used.max(1.0)] }
+            let centre = [0, 1].map(|k| pose.offset[k] * grid.cell + grid.border);
+            Spot { turn: [pose.cos, pose.sin], centre }
         };
         let spots = shapes
             .iter()
             .zip(&layout.placed)
             .map(|(shape, at)| at.map(|at| spot(shape.footprints[at.footprint].pose(at.x, at.y))))
             .collect();
-        Some(Self { spots, density: density / used.sqrt(), cell: grid.cell })
+        Self { spots, density, cell: grid.cell }
     }
 
     /// Whether all charts are turned the same and within two cells of where `other` has them.

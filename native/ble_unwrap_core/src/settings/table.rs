@@ -444,4 +444,6 @@ pub static TABLE: &[Setting] = &[
          resolution."),
     row("rotation", "Rotation", Group::Packing, Kind::Choice(|s| &mut s.packing.rotation), "",
         "How charts may be turned when they are packed."),
+    row("quality", "Packing Quality", Group::Packing, Kind::Choice(|s| &mut s.packing.quality), "",
+        "How long a dense placement of the charts is searched for."),
 ];
