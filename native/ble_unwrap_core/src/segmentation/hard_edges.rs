@@ -184,14 +184,13 @@ pub(super) mod tests {
         for row in 0..profile.len() - 1 {
             between_rings(sides, [row, row + 1], &mut triangles, &mut polygon);
         }
-        let mut count = triangles.len() as u32 / 2;
-        for (row, turn) in [(0, true), (profile.len() - 1, false)] {
+        let count = triangles.len() as u32 / 2;
+        for (cap, (row, turn)) in (count..).zip([(0, true), (profile.len() - 1, false)]) {
             for k in 1..sides - 1 {
                 let [a, b, c] = [at(row, 0), at(row, k), at(row, k + 1)];
                 triangles.push(if turn { [a, c, b] } else { [a, b, c] });
-                polygon.push(count);
+                polygon.push(cap);
             }
-            count += 1;
         }
         (test_surfaces::mesh(&positions, &triangles), polygon)
     }
