@@ -216,7 +216,10 @@ def bends(mesh, corner_edges, face_sizes, least_angle):
     with_two = np.flatnonzero(of_edge == 2)
     one, other = (normals[face[order[first[with_two] + side]]] for side in (0, 1))
     bent = np.zeros(len(mesh.edges), bool)
-    bent[with_two] = (one * other).sum(axis=1) <= np.cos(np.radians(least_angle)) + 1e-6
+    # A face without area has no normal, whatever Blender gives it.
+    has_area = read_array(mesh.polygons, "area", np.float32) > 0.0
+    known = has_area[face[order[first[with_two]]]] & has_area[face[order[first[with_two] + 1]]]
+    bent[with_two] = known & ((one * other).sum(axis=1) <= np.cos(np.radians(least_angle)) + 1e-6)
     return bent
 
 

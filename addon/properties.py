@@ -74,7 +74,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     )
     use_sharp: BoolProperty(
         name="Cut at Sharp Edges",
-        description="Cut along all edges that are marked sharp, and those sharper than Sharp Angle",
+        description="Cut along all edges that are sharp: marked so, or bent by at least Sharp Angle",
         default=False,
     )
     use_materials: BoolProperty(
@@ -86,7 +86,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         name="Sharp Angle",
         description=(
             "Edges at which the normals of two faces are at least so many degrees apart count as sharp, whether or not "
-            "they are marked; at 180 only marked ones do"
+            "they are marked; at 180 only marked ones do. Measured on the mesh itself, without the object's scale"
         ),
         default=180.0,
         min=1.0,
@@ -101,7 +101,9 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     )
     follow_sharp: BoolProperty(
         name="Follow Sharp Edges",
-        description="Where a chart needs a border, draw it to edges that are marked sharp",
+        description=(
+            "Where a chart needs a border, draw it to edges that are sharp: marked so, or bent by at least Sharp Angle"
+        ),
         default=True,
     )
     follow_materials: BoolProperty(

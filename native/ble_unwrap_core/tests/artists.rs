@@ -373,6 +373,51 @@ fn a_bottle_is_a_rectangle_with_a_shoulder_and_round_ends() {
     }
 }
 
+#[test]
+fn a_frame_is_made_of_planes_at_right_angles() {
+    for inner in [0.4, 0.7, 0.9] {
+        let square = |half: f64, z: f64| {
+            [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| [half * x, half * y, z])
+        };
+        let positions = [square(1.0, 0.0), square(inner, 0.0), square(1.0, 0.3), square(inner, 0.3)].concat();
+        let around = |k: u32| [k, (k + 1) % 4];
+        let faces = (0..4).map(around).flat_map(|[a, b]| {
+            [[a, 4 + a, 4 + b, b], [8 + a, 8 + b, 12 + b, 12 + a], [a, b, 8 + b, 8 + a], [4 + a, 12 + a, 12 + b, 4 + b]]
+        });
+        let frame = PolyMesh { positions, faces: faces.map(Vec::from).collect() };
+        for mesh in in_all_ways(&frame) {
+            let atlas = unwrapped(&mesh, &Settings::default());
+            // The mitres of its corners are aslant, where seams run along them.
+            let aligned = aligned_share(&mesh, &atlas);
+            assert!(atlas.report.l2 < 1.0001 && aligned > 0.9 && atlas.report.charts <= 6, "{inner}: {aligned}");
+        }
+    }
+}
+
+#[test]
+fn a_pyramid_is_a_net_or_a_fan_and_a_base() {
+    for high in [0.5, 1.5, 4.0] {
+        let base = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
+        let positions = [&base[..], &[[0.0, 0.0, high]]].concat();
+        let sides = (0..4).map(|k| vec![k, (k + 1) % 4, 4]);
+        let pyramid = PolyMesh { positions, faces: std::iter::once(vec![3, 2, 1, 0]).chain(sides).collect() };
+        for mesh in in_all_ways(&pyramid) {
+            let atlas = unwrapped(&mesh, &Settings::default());
+            assert!(atlas.report.l2 < 1.0001 && atlas.report.charts <= 2, "{high}: {}", atlas.report.charts);
+        }
+    }
+}
+
+#[test]
+fn a_ball_is_a_few_symmetric_pieces() {
+    for (around, along) in [(16, 8), (32, 16), (48, 24)] {
+        let ball = uv_sphere(around, along);
+        let atlas = unwrapped(&ball, &Settings::default());
+        assert!((2..=6).contains(&atlas.report.charts), "{around}: {}", atlas.report.charts);
+        assert_eq!(mirrored_share(&ball, &atlas), 1.0, "{around}");
+    }
+}
+
 /// A body of revolution around z of a closed profile.
 fn turned_ring(sides: usize, profile: &[[f64; 2]]) -> PolyMesh {
     let n = profile.len();

@@ -2,7 +2,7 @@
 
 use ble_unwrap_core::settings::{Holes, LimitOver};
 use ble_unwrap_core::{Analysis, Atlas, MeshInput, Progress, Settings, UnwrapError, unwrap};
-use ble_unwrap_fixtures::{FlatPolygons, PolyMesh, many_components, uv_sphere};
+use ble_unwrap_fixtures::{FlatPolygons, PolyMesh, many_components, uv_sphere, wrapped_grid};
 use rayon::ThreadPoolBuilder;
 
 fn input<'a>(mesh: &'a PolyMesh, flat: &'a FlatPolygons) -> MeshInput<'a> {
@@ -104,9 +104,18 @@ fn a_limit_over_the_atlas_is_spent_on_fewer_charts_and_kept() {
     assert!(single > 0, "no chart has more than the limit: the room was not used");
 }
 
+/// Its rims are strips or rings, by `straighten`.
+fn hoop() -> PolyMesh {
+    wrapped_grid(48, 4, [true, true], |u, v| {
+        let [r, z] = [[0.94, 0.0], [1.0, 0.0], [1.0, 0.3], [0.94, 0.3]][(4.0 * v).round() as usize % 4];
+        let (s, c) = (std::f64::consts::TAU * u).sin_cos();
+        [r * c, r * s, z]
+    })
+}
+
 #[test]
 fn an_analysis_gives_what_unwrap_gives_whatever_came_before() {
-    for mesh in [blob(), uv_sphere(80, 40)] {
+    for mesh in [blob(), uv_sphere(80, 40), hoop()] {
         let flat = mesh.flat();
         let analysis = Analysis::new(&input(&mesh, &flat), &Settings::default(), &Progress::new()).expect("a mesh");
         assert_eq!(analysis.face_count(), mesh.faces.len());
@@ -119,6 +128,8 @@ fn an_analysis_gives_what_unwrap_gives_whatever_came_before() {
             Settings { seed: 3, ..limit(1.05) },
             Settings { limit_over: LimitOver::Atlas, ..limit(1.05) },
             Settings { holes: Holes::Cut, ..limit(1.02) },
+            Settings { straighten: 0.0, limit_over: LimitOver::Atlas, ..limit(1.05) },
+            Settings { straighten: 0.0, ..limit(1.05) },
             limit(1.05),
         ];
         for settings in &calls {

@@ -91,8 +91,8 @@ impl PackedCharts {
 ///
 /// Notes
 /// -----
-/// All charts are scaled by the same factor, specks aside, which are enlarged to about a texel unless the scale is fixed; a group is one in
-/// this. Charts that overlap themselves are packed as they are. Charts keep their shape in texels: if the texture is not square, multiply the
+/// All charts are scaled by the same factor, specks aside, which are enlarged to about a texel unless the scale is fixed; a group is enlarged
+/// as one. Charts that overlap themselves are packed as they are. Charts keep their shape in texels: if the texture is not square, multiply the
 /// ``v`` of UVs that are to be moved by its height over its width first.
 #[pyfunction]
 #[pyo3(signature = (points, triangles, chart, *, groups=None, obstacles=None, border_margin=None, scale=None, job=None, **settings),

@@ -176,15 +176,19 @@ impl<'a> Attempt<'a> {
 
     /// A thin ring as a straight strip, if its straight borders are worth the stretch.
     pub(super) fn strip(&self, price: &Price, rungs: &mut Rungs) -> Option<Chart> {
+        let (mesh, settings) = (&self.patch().mesh, self.settings);
         let is_ring = self.topology.loops == 2 && self.topology.genus() == 0;
-        if !is_ring || self.settings.moves != Moves::All || cost::may_bend(self.settings.stretch_price) {
+        let is_wanted =
+            settings.straighten > 0.0 && settings.moves == Moves::All && !cost::may_bend(settings.stretch_price);
+        if !is_ring || !is_wanted || !mesh.vertices().all(|v| mesh.is_boundary_vertex(v)) {
             return None;
         }
         let open = self.cut_to_disk();
         let (flat, along) = flattening::strip(self.patch(), &open)?;
         let (l2, chart) = (flat.l2, flat.into_chart(open));
+        // Round it would have no stretch: nothing is curved where no vertex lies inside.
         let round = Chart { l2: 1.0, ..chart.clone() };
-        if l2 > self.settings.stretch_limit || !price.is_worth_straightening(&round, l2, along) {
+        if l2 > settings.stretch_limit || !price.is_worth_straightening(&round, l2, along) {
             return None;
         }
         rungs.take(Rung::CutOpen);

@@ -79,7 +79,7 @@ fn is_large(whole: &Patch, settings: &Settings) -> bool {
     whole.mesh.vertex_count() > COARSE_ABOVE && settings.coarse
 }
 
-/// The charts of the parts of a component: what does not unroll and is large is charted as a component is.
+/// The charts of the parts of a component: what does not unroll and is large, as a plane with wide bevels may be, is charted as a component is.
 fn by_parts(
     parts: Vec<Patch>,
     whole: &Patch,
@@ -88,7 +88,7 @@ fn by_parts(
     run: &Run<'_>,
 ) -> Result<Charting, Cancelled> {
     let (large, others): (Vec<Patch>, Vec<Patch>) =
-        parts.into_iter().partition(|part| !part.mesh.is_all_parts() && is_large(part, settings));
+        parts.into_iter().partition(|part| is_large(part, settings) && !segmentation::is_developable(&part.mesh));
     let price = Price::new(&whole.mesh, settings);
     let mut charting = divide::divide(others, &price, settings, &|faces| charted.add(faces, 1.0), run)?;
     for part in large {

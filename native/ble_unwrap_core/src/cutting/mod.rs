@@ -173,13 +173,12 @@ fn charts_of(
     charted: &Charted<'_>,
     run: &Run<'_>,
 ) -> Result<Arc<Made>, Cancelled> {
-    let input = |f: &mut Fingerprint, straighten: f64| {
+    let input = |f: &mut Fingerprint| {
         f.mesh(&whole.mesh);
         f.numbers(&whole.polygon);
         // They are named in the result.
         f.indices(faces.iter().map(|face| face.index()));
         f.settings(&Settings {
-            straighten,
             chart_scale: ChartScale::Uniform,
             packing: PackSettings::default(),
             ..settings.clone()
@@ -188,7 +187,7 @@ fn charts_of(
     let bytes = |made: &Made| made.0.iter().map(|c| cache::bytes_of(&c.patch.mesh) + 24 * c.uv.len()).sum();
     let found = || {
         let charts = || component::charts(whole, faces, settings, charted, run);
-        run.recall(Kind::Charts, |f| input(f, 0.0), bytes, charts)
+        run.recall(Kind::Charts, input, bytes, charts)
     };
     // Under a limit over the atlas charts are still to be joined.
     if settings.limit_over == LimitOver::Atlas {
@@ -200,5 +199,5 @@ fn charts_of(
         let price = Price::new(&whole.mesh, settings);
         Ok((touch_up(charts, &price, settings, &mut rungs, run.progress)?, rungs))
     };
-    run.recall(Kind::TouchedUp, |f| input(f, settings.straighten), bytes, touched)
+    run.recall(Kind::TouchedUp, input, bytes, touched)
 }

@@ -9,12 +9,15 @@ use crate::stretch;
 
 use super::ladder::{Flat, Positions, l2};
 
+/// A border that turns by at least so many degrees at a vertex has a corner there: the frame of a picture is no ring.
+const CORNER: f64 = 50.0;
 /// The shorter border of a thin ring is at least so many times as long as the other: the rim of a hoop, not a washer.
 const THIN: f64 = 0.75;
 
 /// A thin ring that was cut open from one of its borders to the other as a rectangle: the rim of a cup, the side of a coin. Its borders and
 /// the two sides of the cut become straight, and points on them keep their distances but for a factor. `ring` is the patch before the cut.
-/// The length of the borders comes with it. `None` for what is no thin ring, and where a vertex lies between the borders.
+/// The length of the borders comes with it. `None` for what is no thin ring, for a ring with corners, whose sides are straight as
+/// they are, and where a vertex lies between the borders.
 pub(crate) fn strip(ring: &Patch, open: &Patch) -> Option<(Flat, f64)> {
     let mesh = &open.mesh;
     let loops = mesh.boundary_loops();
@@ -30,6 +33,18 @@ pub(crate) fn strip(ring: &Patch, open: &Patch) -> Option<(Flat, f64)> {
     let sides: Vec<&[HalfedgeId]> = outline.chunk_by(|a, b| is_cut(*a) == is_cut(*b)).collect();
     let [low, _, high, _] = sides[..] else { return None };
     let length = |side: &[HalfedgeId]| side.iter().map(|&h| mesh.edge_length(h)).sum::<f64>();
+    let has_corner = |side: &[HalfedgeId]| {
+        let along = |h: HalfedgeId| mesh.position(mesh.to(h)) - mesh.position(mesh.from(h));
+        let least = CORNER.to_radians().cos();
+        let turns = |(k, &h): (usize, &HalfedgeId)| {
+            let (before, after) = (along(side[(k + side.len() - 1) % side.len()]), along(h));
+            before.dot(&after) <= least * before.norm() * after.norm()
+        };
+        side.iter().enumerate().any(turns)
+    };
+    if has_corner(low) || has_corner(high) {
+        return None;
+    }
     let borders = [length(low), length(high)];
     let along = borders[0] + borders[1];
     let long = 0.5 * along;

@@ -70,9 +70,9 @@ pub(crate) fn lay_out(
                 let faulty: BTreeSet<usize> =
                     certificate.faulty_charts.iter().filter_map(|&c| usize::try_from(c).ok()).collect();
                 let faults = Faults { round, faulty: &faulty, broken: &layout.broken };
-                charts = mend::mend(surface, charts, &faults, &mut rungs, settings, run)?;
-                // Sides that could be straightened are so already, and what was made anew is not looked at for them.
+                // Sides that could be straightened are so already, and what is made anew is not looked at for them.
                 let unstraightened = Settings { straighten: 0.0, ..settings.clone() };
+                charts = mend::mend(surface, charts, &faults, &mut rungs, &unstraightened, run)?;
                 let price = Price::new(&surface.mesh, &unstraightened);
                 charts = cutting::touch_up(charts, &price, &unstraightened, &mut rungs, run.progress)?;
             }

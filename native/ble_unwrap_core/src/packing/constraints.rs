@@ -33,6 +33,10 @@ impl Constraints<'_> {
             return Err(PackError::Border { border });
         }
         let PackSettings { width, height, margin_texels: margin, .. } = *settings;
+        // A margin as long as the texture leaves room for one chart at most, whatever the border.
+        if margin >= f64::from(width).hypot(f64::from(height)) {
+            return Err(PackError::MarginTooLarge { margin, width, height });
+        }
         if f64::from(width.min(height)) - 2.0 * border >= 1.0 {
             return Ok(());
         }

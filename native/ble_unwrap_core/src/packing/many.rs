@@ -8,8 +8,9 @@ use super::search::{Best, Search};
 use super::shelves::{Shelves, Taken};
 use crate::progress::Cancelled;
 
-/// From so many charts on rows are tried whatever the quality, and from so many on nothing else is.
+/// From so many charts on rows are tried whatever the quality.
 pub(super) const ROWS_TRIED: usize = 600;
+/// From so many charts on nothing but rows is tried.
 pub(super) const ROWS_ONLY: usize = 8000;
 /// From so many charts on the large ones are placed by their cells. With fewer, the search over all charts does the same as well.
 const AROUND_LARGE: usize = 1500;
@@ -17,8 +18,9 @@ const AROUND_LARGE: usize = 1500;
 const LARGE: f64 = 1.0 / 2000.0;
 /// Most large charts: a placement of so many takes some ten milliseconds.
 const MOST_LARGE: usize = 512;
-/// Attempts until one fits, each less dense by this factor; and from the first fit on, each denser by the inverse.
+/// Most attempts.
 const ATTEMPTS: u32 = 60;
+/// Until an attempt fits, each is less dense by this factor; if the first fits, each is denser by the inverse until one does not.
 const STEP: f64 = 0.85;
 /// Densities this close to too dense are not improved on.
 const CLOSE: f64 = 1.0005;

@@ -99,7 +99,8 @@ pub(super) fn covered(
         area += 0.5 * doubled.abs();
         cover(&mut touched, triangle.map(|p| p / cell), 0.0);
     }
-    Ok(area.min(touched.count() as f64 * cell * cell))
+    // The cells at the far borders reach beyond the texture.
+    Ok(area.min(touched.count() as f64 * cell * cell).min(width * height))
 }
 
 /// Sets the cells of a mask that a triangle touches, grown by `growth` cells in the maximum norm, as far as they lie in the mask.

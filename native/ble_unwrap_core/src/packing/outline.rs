@@ -148,7 +148,7 @@ impl Outline {
 }
 
 /// Coordinates up to this can be subtracted and squared.
-const LARGEST: f64 = 1e150;
+pub(crate) const LARGEST: f64 = 1e150;
 
 #[cfg(test)]
 mod tests {

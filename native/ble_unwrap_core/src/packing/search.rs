@@ -34,8 +34,8 @@ const STEP: f64 = 0.003;
 const LEAST_STEP: f64 = 0.0004;
 /// An attempt that uses the height to this share is a start for variations.
 const NEAR: f64 = 0.015;
-/// Between obstacles, densities are halved between the best that fitted and the least dense that did not as long as these differ by more than
-/// twice this share.
+/// Between obstacles, the next density is the geometric mean of the best that fitted and the least dense that did not, as long as these differ by
+/// more than twice this share.
 const HALVED: f64 = 0.02;
 /// Rounds without a better fit before the step is halved.
 const PATIENCE: usize = 3;

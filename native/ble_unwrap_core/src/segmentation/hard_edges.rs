@@ -1,4 +1,4 @@
-//! Parts between hard edges: the walls, caps and flats of which a manufactured thing is made.
+//! Parts between hard edges: the walls, caps and flats of which a manufactured thing is made. Where its edges are bevelled, `walls` finds them.
 
 use nalgebra::Vector3;
 
@@ -24,27 +24,25 @@ pub(super) const LEAST_FACES: usize = 6;
 const LEAST_SHARE: f64 = 0.8;
 /// Of other things, plane parts of at least this share of the area are parts: the caps of a barrel, the base of a bust.
 pub(super) const LEAST_PLANE: f64 = 0.05;
-/// Normals of a plane part are at most so many degrees from their mean.
+/// Normals of a plane are at most so many degrees from their mean, or from that of its largest face; two directions that are no further apart
+/// are the same.
 pub(super) const MOST_LEANING: f64 = 3.0;
 
 /// The parts between the hard edges of a thing that unroll without stretch: a number from 1 on for each face, and 0 for
 /// faces that are in none. Empty where there are no such parts or the whole is one. Of what is not known to be manufactured, parts count
-/// only if most of it is made of them, or if they are large planes, and not where there are guides: these say where to cut. O(n log n).
+/// only if most of it is made of them; else planes and walls do, with the bevels around planes, if most of it is made of these
+/// ([`walls::planes_and_walls`]), or large planes between hard edges; and none do where there are guides: these say where to cut. O(n log n).
 pub(crate) fn unrolling_parts(mesh: &TriMesh, polygon: &[u32], is_manufactured: bool) -> Vec<u32> {
     if mesh.has_guides() && !is_manufactured {
         return Vec::new();
     }
     let (normals, areas) = (measure::face_normals(mesh), measure::face_areas(mesh));
-    let is_hard = |degrees: f64| {
-        let least = degrees.to_radians().cos();
-        let (normals, areas) = (&normals, &areas);
-        move |h: HalfedgeId| {
-            let (f, g) = (h.face().index(), mesh.twin(h).face().index());
-            // A face without area has no normal, and no edge of it is hard.
-            areas[f].min(areas[g]) > 0.0 && polygon[f] != polygon[g] && normals[f].dot(&normals[g]) <= least
-        }
+    let least = if is_manufactured { HARD_OF_MANUFACTURED } else { HARD }.to_radians().cos();
+    let is_edge = |h: HalfedgeId| {
+        let (f, g) = (h.face().index(), mesh.twin(h).face().index());
+        // A face without area has no normal, and no edge of it is hard.
+        areas[f].min(areas[g]) > 0.0 && polygon[f] != polygon[g] && normals[f].dot(&normals[g]) <= least
     };
-    let is_edge = is_hard(if is_manufactured { HARD_OF_MANUFACTURED } else { HARD });
     let (part, parts) = connected(mesh, |h| !is_edge(h));
     if areas.iter().all(|area| *area <= 0.0) {
         return Vec::new();
@@ -54,10 +52,11 @@ pub(crate) fn unrolling_parts(mesh: &TriMesh, polygon: &[u32], is_manufactured: 
     let total: f64 = area.iter().sum();
     let unrolls = unrolling(mesh, &part, parts);
     let unrolled: f64 = (0..parts).filter(|&p| unrolls[p]).map(|p| area[p]).sum();
-    let is_fine = is_manufactured || parts * LEAST_FACES <= mesh.face_count();
-    let are_parts = parts > 1 && is_fine && unrolled >= LEAST_SHARE * total;
-    let divides = is_hard(HARD);
-    if !are_parts && let Some(found) = walls::planes_and_walls(mesh, polygon, &normals, &areas, &divides) {
+    let are_parts = parts > 1 && parts * LEAST_FACES <= mesh.face_count() && unrolled >= LEAST_SHARE * total;
+    if !is_manufactured
+        && !are_parts
+        && let Some(found) = walls::planes_and_walls(mesh, polygon, &normals, &areas, &is_edge)
+    {
         return found;
     }
     if parts < 2 {
@@ -110,6 +109,11 @@ fn connected(mesh: &TriMesh, is_open: impl Fn(HalfedgeId) -> bool) -> (Vec<u32>,
         parts += 1;
     }
     (label, parts as usize)
+}
+
+/// Whether a mesh as a whole is flat, a cylinder, a cone or the like.
+pub(crate) fn is_developable(mesh: &TriMesh) -> bool {
+    unrolling(mesh, &vec![0; mesh.face_count()], 1) == [true]
 }
 
 /// Whether each part is flat, a cylinder, a cone or the like.

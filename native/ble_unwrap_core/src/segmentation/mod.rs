@@ -34,7 +34,7 @@ use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
 
 pub(crate) use between::between;
-pub(crate) use hard_edges::{between_parts, unrolling_parts};
+pub(crate) use hard_edges::{between_parts, is_developable, unrolling_parts};
 pub(crate) use min_cut::CutGraph;
 use polygon_graph::PolygonGraph;
 pub(crate) use spectral::SpectralAnalysis;

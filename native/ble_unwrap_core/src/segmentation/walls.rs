@@ -11,12 +11,13 @@ use super::hard_edges::{LEAST_FACES, LEAST_PLANE, MOST_LEANING};
 /// A thing is made of planes and walls if large ones have at least this share of its area: a box of which each side is rounded over by
 /// a seventh at both ends has 0.69, and a bottle 0.74 without its neck.
 const LEAST_SHARE: f64 = 2.0 / 3.0;
-/// Planes of at least this share of the area have walls around them looked for, and are kept where such a wall ends: the end of a plank.
+/// Around planes of at least this share of the area walls are looked for, and such planes are kept where there is a wall around them: the end of a
+/// plank.
 const LEAST_END: f64 = 0.01;
 /// What lies around a plane goes with it up to so many times its area. The rounded rim of the box above has 1.7 times the area of its side,
 /// and lies in the plane with an L2 stretch of 1.003.
 const MOST_RIM: f64 = 2.0;
-/// Two triangles whose normals are so many degrees apart are two halves of one quad.
+/// Two triangles whose normals are at most so many degrees apart may be two halves of one quad.
 const HALVES: f64 = 0.5;
 
 /// A plane, or a wall: all that stands upright on a plane and hangs together, as the sides of a cylinder, of a prism or of a box with
@@ -173,13 +174,19 @@ impl<'a> Thing<'a> {
         let mut rim = vec![0.0; taken.len() + 1];
         while let Some(f) = open.pop_front() {
             let number = nearest[f.index()];
-            let mut polygon: Vec<FaceId> = self.neighbours(f).collect();
-            while let Some(g) = polygon.pop() {
+            // A step takes a whole polygon, and the other half of what may be half a quad.
+            let mut step: Vec<(FaceId, bool)> = self.neighbours(f).map(|g| (g, true)).collect();
+            while let Some((g, is_first)) = step.pop() {
                 if part[g.index()] == 0 && nearest[g.index()] == 0 {
                     nearest[g.index()] = number;
                     rim[number as usize] += self.areas[g.index()];
                     open.push_back(g);
-                    polygon.extend(self.neighbours(g).filter(|h| self.is_one_polygon(g, *h)));
+                    step.extend(self.neighbours(g).filter_map(|h| {
+                        let is_same = self.polygon[g.index()] == self.polygon[h.index()];
+                        let is_other_half =
+                            is_first && self.normal(g).dot(&self.normal(h)) >= HALVES.to_radians().cos();
+                        (is_same || is_other_half).then_some((h, is_same && is_first))
+                    }));
                 }
             }
         }
@@ -189,12 +196,6 @@ impl<'a> Thing<'a> {
                 *own = nearest;
             }
         }
-    }
-
-    /// Whether two neighbours are of one polygon, or two halves of what was one.
-    fn is_one_polygon(&self, f: FaceId, g: FaceId) -> bool {
-        self.polygon[f.index()] == self.polygon[g.index()]
-            || self.normal(f).dot(&self.normal(g)) >= HALVES.to_radians().cos()
     }
 }
 

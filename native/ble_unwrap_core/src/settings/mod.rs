@@ -137,7 +137,7 @@ pub enum Style {
 choices!(Style {
     Auto: "auto", "Auto", "Parts between hard edges that can lie flat without stretch do so if most of a connected piece is made of them, and so do planes and walls between bevels; else only large planes do.";
     Organic: "organic", "Organic", "Hard edges are not treated specially.";
-    Hard: "hard", "Hard Surface", "All such parts lie flat without stretch, whatever the piece is made of, and edges count as hard from 40° instead of 50°.";
+    Hard: "hard", "Hard Surface", "All parts between hard edges lie flat without stretch, but for thin rings that become strips, whatever the piece is made of; edges count as hard from 40° instead of 50°.";
 });
 
 /// How charts are scaled relative to each other.
@@ -240,7 +240,7 @@ pub struct Settings {
     pub style: Style,
     /// How much seam a straight side is worth that lies along an axis of the texture: where the border of a chart runs straight on the surface
     /// between two corners, it is made straight in the chart, and laid along an axis, if that costs less in stretch than so many times its
-    /// length costs as seam. On the same condition thin rings, as the rim of a hoop, are opened and become strips. Has an effect only with all
+    /// length costs as seam. On the same condition thin rings, such as the rim of a hoop, are opened and become strips. Has an effect only with all
     /// `moves`, and none where `stretch_price` is 0.
     pub straighten: f64,
     /// What happens to the holes of charts.

@@ -268,7 +268,7 @@ impl<'a> Input<'a> {
             for point in triangles[t] {
                 let place = usize::try_from(point).ok().filter(|&p| p < points.len());
                 let place = place.ok_or(RepackError::PointOutOfRange { triangle: t, point, points: points.len() })?;
-                if !points[place].iter().all(|x| x.abs() <= LARGEST) {
+                if !points[place].iter().all(|x| x.abs() <= packing::LARGEST) {
                     return Err(RepackError::NotFinite { triangle: t, point: place });
                 }
                 match first[place] {
@@ -332,9 +332,6 @@ impl<'a> Input<'a> {
         Ok(islands)
     }
 }
-
-/// Coordinates up to this can be packed.
-const LARGEST: f64 = 1e150;
 
 /// The rigid whole of each triangle, by the least number of a chart in it: charts of a group are one, other charts are each for themselves.
 fn wholes(chart: &[i32], groups: &[i32], progress: &Progress) -> Result<Vec<i32>, RepackError> {

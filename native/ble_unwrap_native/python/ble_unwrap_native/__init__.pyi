@@ -72,7 +72,7 @@ class _ChartsGroup(TypedDict, total=False):
     symmetry: Literal["auto", "off"]
     """Whether seams of mirrored surfaces are mirrored, too. "auto": Where a piece has a mirror plane along edges, so have its seams. "off": Seams are found without regard to mirror planes."""
     style: Literal["auto", "organic", "hard"]
-    """Whether planes, cylinders and the like between hard edges keep their shape. "auto": Parts between hard edges that can lie flat without stretch do so if most of a connected piece is made of them, and so do planes and walls between bevels; else only large planes do. "organic": Hard edges are not treated specially. "hard": All such parts lie flat without stretch, whatever the piece is made of, and edges count as hard from 40° instead of 50°."""
+    """Whether planes, cylinders and the like between hard edges keep their shape. "auto": Parts between hard edges that can lie flat without stretch do so if most of a connected piece is made of them, and so do planes and walls between bevels; else only large planes do. "organic": Hard edges are not treated specially. "hard": All parts between hard edges lie flat without stretch, but for thin rings that become strips, whatever the piece is made of; edges count as hard from 40° instead of 50°."""
     straighten: float
     """How much seam a straight side along an axis of the texture is worth. Sides of charts that are straight on the surface are made straight, and thin rings become strips, where that costs less in stretch; 0 leaves them as they are."""
     moves: Literal["split", "join", "all"]
@@ -428,7 +428,7 @@ def pack(
     groups: Buffer | None = None,
     obstacles: Buffer | None = None,
     border_margin: float | None = None,
-    scale: Literal["uniform", "fixed"] = "uniform",
+    scale: Literal["uniform", "fixed"] | None = "uniform",
     job: Job | None = None,
     **settings: Unpack[_PackSettings],
 ) -> PackedCharts: ...

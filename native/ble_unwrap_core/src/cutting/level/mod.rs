@@ -136,6 +136,8 @@ impl<'a> OnCoarse<'a> {
         let whole = Patch::whole(Arc::new(coarse.mesh.clone()), polygon);
         let mut of_coarse = settings.clone();
         of_coarse.stretch.tolerance *= COARSE_TOLERANCE;
+        // What is straight on the coarse mesh is minimised on the fine one, and bent again.
+        of_coarse.straighten = 0.0;
         let mut strict = of_coarse.clone();
         strict.stretch_limit = 1.0 + STRICT_ALLOWANCE * (settings.stretch_limit - 1.0);
         Ok(Self { fine, whole, coarse, settings, of_coarse, strict })
