@@ -4,7 +4,7 @@ import json
 
 import bpy
 
-from . import last_result, mesh_bridge, properties, targets
+from . import last_result, properties, targets
 
 CATEGORY = "BLE Unwrap"
 STATUS_ICONS = {"HEAD": "DOT", "OK": "CHECKMARK", "BAD": "ERROR", "WARN": "INFO", "INFO": "BLANK1"}
@@ -30,9 +30,9 @@ def panel_settings(settings, context, names):
         left_out.add("uv_map_name")  # a cloud has no active map: its attribute goes by name
     if not surfaces:
         left_out.update(properties.SURFACE_SETTINGS)
-    for kind in mesh_bridge.MARKS:
-        if getattr(settings, f"use_{kind}"):
-            left_out.add(f"follow_{kind}")  # they are all cut
+    for name in names:
+        if name.startswith("follow_") and getattr(settings, name.replace("follow_", "use_", 1)):
+            left_out.add(name)  # they are all cut
     if not clouds:
         left_out.update(properties.CLOUD_SETTINGS)
     return [name for name in names if name not in left_out]

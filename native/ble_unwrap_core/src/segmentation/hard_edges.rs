@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::mesh::{HalfedgeId, TriMesh, VertexId, measure};
 
 use super::Segmentation;
-use super::walls;
+use super::walls::{self, LEAST_FACES, LEAST_PLANE, MOST_LEANING};
 
 /// Normals of two faces on a hard edge are at least so many degrees apart: the sides of a hexagonal nut are 60°, those of
 /// an octagonal tube 45°, which is meant to be round.
@@ -16,17 +16,9 @@ const HARD_OF_MANUFACTURED: f64 = 40.0;
 /// be the apex of a cone. A spherical cap of so much curvature, which ends 23° from its pole, has an L2 stretch of 1.0001 in the plane,
 /// and one that ends at 40° has 1.0008.
 const MOST_CURVED: f64 = 0.5;
-/// Parts have at least so many triangles on average. With fewer they are the facets of a crystal or of crumpled paper, and distances tell better
-/// which of them belong together.
-pub(super) const LEAST_FACES: usize = 6;
 /// A thing is manufactured if parts that unroll have at least this share of its area; then all of them are kept. With a half in its place a
 /// table with barrels and bottles on it has twice as much seam, and a fan disk 1.4 times.
 const LEAST_SHARE: f64 = 0.8;
-/// Of other things, plane parts of at least this share of the area are parts: the caps of a barrel, the base of a bust.
-pub(super) const LEAST_PLANE: f64 = 0.05;
-/// Normals of a plane are at most so many degrees from their mean, or from that of its largest face; two directions that are no further apart
-/// are the same.
-pub(super) const MOST_LEANING: f64 = 3.0;
 
 /// The parts between the hard edges of a thing that unroll without stretch: a number from 1 on for each face, and 0 for
 /// faces that are in none. Empty where there are no such parts or the whole is one. Of what is not known to be manufactured, parts count

@@ -6,8 +6,14 @@ use nalgebra::Vector3;
 
 use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 
-use super::hard_edges::{LEAST_FACES, LEAST_PLANE, MOST_LEANING};
-
+/// Parts have at least so many triangles on average. With fewer they are the facets of a crystal or of crumpled paper, and distances tell better
+/// which of them belong together.
+pub(super) const LEAST_FACES: usize = 6;
+/// A plane or a wall is large from this share of the area on: the caps of a barrel, the base of a bust.
+pub(super) const LEAST_PLANE: f64 = 0.05;
+/// Normals of a plane are at most so many degrees from their mean, or from that of its largest face; two directions that are no further apart
+/// are the same.
+pub(super) const MOST_LEANING: f64 = 3.0;
 /// A thing is made of planes and walls if large ones have at least this share of its area: a box of which each side is rounded over by
 /// a seventh at both ends has 0.69, and a bottle 0.74 without its neck.
 const LEAST_SHARE: f64 = 2.0 / 3.0;
