@@ -209,17 +209,17 @@ def read_marks(mesh, face_sizes, sharp_angle):
 def bends(mesh, corner_edges, face_sizes, least_angle):
     """The edges at which the normals of two faces are at least so many degrees apart, (e,) bool."""
     normals = read_array(mesh.polygons, "normal", np.float32, 3)
+    areas = read_array(mesh.polygons, "area", np.float32)
     face = np.repeat(np.arange(len(face_sizes)), face_sizes)
     order = np.argsort(corner_edges, kind="stable")
     of_edge = np.bincount(corner_edges, minlength=len(mesh.edges))
     first = np.cumsum(of_edge) - of_edge
     with_two = np.flatnonzero(of_edge == 2)
-    one, other = (normals[face[order[first[with_two] + side]]] for side in (0, 1))
+    one, other = (face[order[first[with_two] + side]] for side in (0, 1))
+    # A face without area has no normal, whatever Blender gives it; the others are known to single precision.
+    known = (areas[one] > 0.0) & (areas[other] > 0.0)
     bent = np.zeros(len(mesh.edges), bool)
-    # A face without area has no normal, whatever Blender gives it.
-    has_area = read_array(mesh.polygons, "area", np.float32) > 0.0
-    known = has_area[face[order[first[with_two]]]] & has_area[face[order[first[with_two] + 1]]]
-    bent[with_two] = known & ((one * other).sum(axis=1) <= np.cos(np.radians(least_angle)) + 1e-6)
+    bent[with_two] = known & ((normals[one] * normals[other]).sum(axis=1) <= np.cos(np.radians(least_angle)) + 1e-6)
     return bent
 
 

@@ -337,6 +337,16 @@ def test_edges_over_an_angle_are_cut():
         assert not all(is_cut(obj, edge.index) for edge in obj.data.edges)
 
 
+def test_only_edges_between_two_faces_with_area_are_sharp_by_their_angle(addon):
+    mesh = bpy.data.meshes.new("Corner")
+    # Two squares at a right angle, a triangle without area beside the first, and an edge of no face.
+    points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (1, 0, 1), (1, 1, 1), (0, 0.5, 0), (5, 5, 5), (6, 5, 5)]
+    mesh.from_pydata(points, [(7, 8)], [(0, 1, 2, 3), (1, 4, 5, 2), (0, 3, 6)])
+    marks = addon("mesh_bridge").read_mesh(mesh, None, 60.0)["marks"]
+    assert [sorted(edge) for edge in marks["sharp"].tolist()] == [[1, 2]]
+    assert not len(addon("mesh_bridge").read_mesh(mesh, None, 91.0)["marks"]["sharp"])
+
+
 def test_marks_of_selected_faces_are_read(addon):
     obj, around = marked_cap("seams")
     bridge = addon("mesh_bridge")

@@ -22,6 +22,8 @@ const FACES: [usize; 4] = [23, 46, 90, 180];
 const RINGS: [usize; 4] = [16, 32, 63, 126];
 /// Charts of a packing.
 const CHARTS: [usize; 4] = [4, 16, 64, 256];
+/// Charts of a packing in rows.
+const CROWD: usize = 50_000;
 /// Vertices of the coarse mesh, as a share of the fine one's.
 const COARSE_SHARE: usize = 20;
 
@@ -298,15 +300,26 @@ fn blobs(count: usize) -> Blobs {
     out
 }
 
+/// Charts of one triangle each, of many shapes and sizes.
+fn single_triangles(count: usize) -> Blobs {
+    let side = |k: usize, prime: usize| 0.1 + (k * prime % 97) as f64 / 97.0;
+    let points = (0..count).flat_map(|k| [[0.0, 0.0], [side(k, 31), 0.0], [side(k, 57), side(k, 73)]]).collect();
+    let triangles = (0..count as i32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+    Blobs { points, triangles, chart: (0..count as i32).collect() }
+}
+
 fn packing(criterion: &mut Criterion, one: &ThreadPool) {
     let mut group = group(criterion, "pack");
-    for charts in CHARTS {
+    let of_blobs = CHARTS.map(|charts| ("blobs", charts, blobs as fn(usize) -> Blobs));
+    for (name, charts, make) in
+        of_blobs.into_iter().chain([("triangles", CROWD, single_triangles as fn(usize) -> Blobs)])
+    {
         case(
             &mut group,
             one,
-            BenchmarkId::new("blobs", charts),
+            BenchmarkId::new(name, charts),
             charts,
-            || blobs(charts),
+            || make(charts),
             |blobs| {
                 let rules = RepackRules::default();
                 repack(

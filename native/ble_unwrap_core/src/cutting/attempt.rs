@@ -185,15 +185,15 @@ impl<'a> Attempt<'a> {
         }
         let open = self.cut_to_disk();
         let (flat, along) = flattening::strip(self.patch(), &open)?;
-        let (l2, chart) = (flat.l2, flat.into_chart(open));
+        let l2 = flat.l2;
         // Round it would have no stretch: nothing is curved where no vertex lies inside.
-        let round = Chart { l2: 1.0, ..chart.clone() };
+        let round = Chart { l2: 1.0, ..flat.into_chart(open) };
         if l2 > settings.stretch_limit || !price.is_worth_straightening(&round, l2, along) {
             return None;
         }
         rungs.take(Rung::CutOpen);
         rungs.take(Rung::Straighten);
-        Some(chart)
+        Some(Chart { l2, ..round })
     }
 
     /// The wall of a tube or the like, which lies flat once it is cut from one hole to the other.

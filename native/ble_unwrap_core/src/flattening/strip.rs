@@ -71,28 +71,16 @@ pub(crate) fn strip(ring: &Patch, open: &Patch) -> Option<(Flat, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::TAU;
     use std::sync::Arc;
 
     use super::*;
     use crate::charts;
     use crate::mesh::test_surfaces;
-    use nalgebra::Point3;
 
     /// A flat ring of quads between circles of some radii, and the same cut open.
     fn ring(radii: &[f64]) -> [Patch; 2] {
-        const SIDES: usize = 24;
-        let at = |row: usize, k: usize| (row * SIDES + k % SIDES) as u32;
-        let place = |r: f64| {
-            (0..SIDES)
-                .map(move |k| (TAU * k as f64 / SIDES as f64).sin_cos())
-                .map(move |(s, c)| Point3::new(r * c, r * s, 0.0))
-        };
-        let positions: Vec<Point3<f64>> = radii.iter().flat_map(|&r| place(r)).collect();
-        let quads = (1..radii.len())
-            .flat_map(|row| (0..SIDES).map(move |k| [at(row, k), at(row, k + 1), at(row - 1, k + 1), at(row - 1, k)]));
-        let triangles: Vec<[u32; 3]> = quads.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        let mesh = test_surfaces::mesh(&positions, &triangles);
+        let profile: Vec<[f64; 2]> = radii.iter().map(|&r| [r, 0.0]).collect();
+        let mesh = test_surfaces::turned_wall(24, &profile, false);
         let polygon = (0..mesh.face_count() as u32).map(|f| f / 2).collect();
         let whole = Patch::whole(Arc::new(mesh), polygon);
         let cut = charts::cut_to_disk(&whole.mesh, |h| whole.mesh.edge_length(h), |h| whole.is_diagonal(h));

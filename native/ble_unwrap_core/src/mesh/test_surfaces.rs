@@ -29,6 +29,34 @@ pub(crate) fn cylinder(m: usize, n: usize, height: f64) -> TriMesh {
     })
 }
 
+/// A point of a ring of some sides around z, of a radius and a height.
+fn on_ring(side: usize, sides: usize, [r, z]: [f64; 2]) -> Point3<f64> {
+    let (s, c) = (std::f64::consts::TAU * side as f64 / sides as f64).sin_cos();
+    Point3::new(r * c, r * s, z)
+}
+
+/// Quads between rings around z of a profile of (radius, height), which `is_closed` joins at its ends; the two triangles of quad k are
+/// faces 2k and 2k + 1.
+pub(crate) fn turned_wall(sides: usize, profile: &[[f64; 2]], is_closed: bool) -> TriMesh {
+    let rows = profile.len() - usize::from(!is_closed);
+    patch(sides, rows, true, is_closed, |i, j| on_ring(i, sides, profile[j]))
+}
+
+/// The same of an open profile, with a cap of one polygon at each end. The polygon of each face comes with it.
+pub(crate) fn turned(sides: usize, profile: &[[f64; 2]]) -> (TriMesh, Vec<u32>) {
+    let (positions, mut triangles) = quads(sides, profile.len() - 1, true, false, |i, j| on_ring(i, sides, profile[j]));
+    let walls = triangles.len() as u32;
+    let mut polygon: Vec<u32> = (0..walls).map(|f| f / 2).collect();
+    for (cap, (row, turn)) in (walls / 2..).zip([(0, true), (profile.len() - 1, false)]) {
+        for k in 1..sides - 1 {
+            let [a, b, c] = [0, k, k + 1].map(|k| (row * sides + k) as u32);
+            triangles.push(if turn { [a, c, b] } else { [a, b, c] });
+            polygon.push(cap);
+        }
+    }
+    (mesh(&positions, &triangles), polygon)
+}
+
 /// A torus of radii 1 and `minor`.
 pub(crate) fn torus(m: usize, n: usize, minor: f64) -> TriMesh {
     patch(m, n, true, true, |i, j| {
@@ -41,6 +69,18 @@ pub(crate) fn torus(m: usize, n: usize, minor: f64) -> TriMesh {
 
 /// Quadrilaterals over a grid, each cut along one diagonal, closed in either direction.
 fn patch(m: usize, n: usize, close_i: bool, close_j: bool, point: impl Fn(usize, usize) -> Point3<f64>) -> TriMesh {
+    let (positions, triangles) = quads(m, n, close_i, close_j, point);
+    mesh(&positions, &triangles)
+}
+
+/// The same as points and triangles.
+fn quads(
+    m: usize,
+    n: usize,
+    close_i: bool,
+    close_j: bool,
+    point: impl Fn(usize, usize) -> Point3<f64>,
+) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
     let columns = if close_i { m } else { m + 1 };
     let rows = if close_j { n } else { n + 1 };
     let at = |i: usize, j: usize| ((j % rows) * columns + i % columns) as u32;
@@ -53,7 +93,7 @@ fn patch(m: usize, n: usize, close_i: bool, close_j: bool, point: impl Fn(usize,
             triangles.extend([[a, b, c], [a, c, d]]);
         }
     }
-    mesh(&positions, &triangles)
+    (positions, triangles)
 }
 
 /// The unit sphere: an icosahedron, each face split into four `levels` times.

@@ -177,7 +177,7 @@ fn densest_up_to(
     }
     let mut sketches = Vec::new();
     for effort in Effort::new(n, settings.quality) {
-        let turns = turns_of(effort.angles)?;
+        let more = if effort.angles == FEW_ANGLES { None } else { Some(turns_of(effort.angles)?) };
         let across = (effort.across * (n as f64).sqrt()).clamp(effort.least, effort.most);
         let coarse = Grid::coarse(settings, border, across);
         let lattice = |o: &Outline| (COARSENED * coarse.cell / (guess * o.extent)).clamp(1e-6, 0.1);
@@ -189,7 +189,7 @@ fn densest_up_to(
         let (growth, reach) = (growth(margin, coarse), Reach::new(0.0));
         let search = Search {
             outlines: &simple,
-            turns: &turns,
+            turns: more.as_ref().unwrap_or(&turns),
             grid: coarse,
             growth,
             obstacles: Obstacles::new(constraints.obstacles, coarse, growth, &reach, progress)?,

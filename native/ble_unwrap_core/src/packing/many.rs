@@ -4,6 +4,7 @@ use super::PackError;
 use super::mask::Mask;
 use super::outline::Outline;
 use super::placement::{Dense, Place};
+use super::refine::CLOSE;
 use super::search::{Best, Search};
 use super::shelves::{Shelves, Taken};
 use crate::progress::Cancelled;
@@ -22,8 +23,6 @@ const MOST_LARGE: usize = 512;
 const ATTEMPTS: u32 = 60;
 /// Until an attempt fits, each is less dense by this factor; if the first fits, each is denser by the inverse until one does not.
 const STEP: f64 = 0.85;
-/// Densities this close to too dense are not improved on.
-const CLOSE: f64 = 1.0005;
 
 /// The densest placement found in rows, by bisection of the density from `guess` on, up to `ceiling` texels to a unit of the chart plane. `fine`
 /// is the search on the fine grid; `areas` are those of all charts, in any unit. Fewer charts than [`AROUND_LARGE`] are placed in rows alone.

@@ -38,6 +38,8 @@
 //! order of placement).
 
 mod alone;
+#[cfg(test)]
+mod constrained_tests;
 mod constraints;
 mod cover;
 mod density;

@@ -169,31 +169,10 @@ fn clipped(triangle: [Point2<f64>; 3], low: [f64; 2], high: [f64; 2]) -> Vec<Poi
 
 #[cfg(test)]
 mod tests {
+    use super::super::raster::tests::touches;
     use super::*;
     use crate::packing::PackSettings;
     use proptest::prelude::*;
-
-    /// Whether the square of a cell, grown by `e`, meets a triangle: by separating axes.
-    fn touches(triangle: &[Point2<f64>; 3], x: f64, y: f64, e: f64) -> bool {
-        let (low, high) = ([x - e, y - e], [x + 1.0 + e, y + 1.0 + e]);
-        let square = [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]]
-            .map(|[x, y]| Point2::new(x, y));
-        let mut axes = vec![[1.0, 0.0], [0.0, 1.0]];
-        for k in 0..3 {
-            let side = triangle[(k + 1) % 3] - triangle[k];
-            axes.push([-side.y, side.x]);
-        }
-        axes.iter().all(|a| {
-            let range = |points: &[Point2<f64>]| {
-                points
-                    .iter()
-                    .map(|p| a[0] * p.x + a[1] * p.y)
-                    .fold((f64::MAX, f64::MIN), |r, v| (r.0.min(v), r.1.max(v)))
-            };
-            let (r, t) = (range(&square), range(triangle));
-            r.0 <= t.1 && t.0 <= r.1
-        })
-    }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]

@@ -138,13 +138,13 @@ fn by_row(crossings: &[Crossing], rows: usize) -> Vec<Crossing> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::packing::PackItem;
     use proptest::prelude::*;
 
     /// Whether the axis-aligned square [x, x+1] × [y, y+1] grown by e meets a triangle: separating axes.
-    fn touches(tri: &[Point2<f64>; 3], x: f64, y: f64, e: f64) -> bool {
+    pub(crate) fn touches(tri: &[Point2<f64>; 3], x: f64, y: f64, e: f64) -> bool {
         let (lo, hi) = ([x - e, y - e], [x + 1.0 + e, y + 1.0 + e]);
         let square = [
             Point2::new(lo[0], lo[1]),

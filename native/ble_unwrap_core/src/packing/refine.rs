@@ -27,7 +27,7 @@ const GROWTHS_BETWEEN: u32 = 24;
 /// Least and greatest step of density while nothing was too dense.
 const STEPS: [f64; 2] = [1.002, 1.01];
 /// Densities this close to too dense are not improved on.
-const CLOSE: f64 = 1.0005;
+pub(super) const CLOSE: f64 = 1.0005;
 
 /// Refines sketches on the fine grid.
 pub(super) struct Refinement<'a> {

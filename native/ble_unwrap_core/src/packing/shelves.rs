@@ -23,7 +23,7 @@ const BETWEEN_CHECKS: usize = 1 << 16;
 
 /// A chart as a box, in one pose.
 #[derive(Clone, Copy, Debug)]
-struct Crate {
+struct ChartBox {
     chart: u32,
     turn: [f64; 2],
     /// Lower left corner of the turned outline, in outline units.
@@ -38,7 +38,7 @@ struct Crate {
 /// Charts as boxes, in the order in which they are placed.
 pub(super) struct Shelves<'a> {
     outlines: &'a [Outline],
-    crates: Vec<Crate>,
+    boxes: Vec<ChartBox>,
     grid: Grid,
     /// Distance of two boxes, in texels.
     gap: f64,
@@ -72,20 +72,20 @@ impl<'a> Shelves<'a> {
             progress.check()?;
             let outline = &outlines[i];
             let turn = turns[i].first().copied().unwrap_or([1.0, 0.0]);
-            let given = Crate::new(i, outline, turn);
-            let laid_down = || Crate::new(i, outline, [-turn[1], turn[0]]);
+            let given = ChartBox::new(i, outline, turn);
+            let laid_down = || ChartBox::new(i, outline, [-turn[1], turn[0]]);
             let lies = if quarters && given.size[1] > given.size[0] { laid_down() } else { given };
             Ok(lies)
         };
-        let boxes: Vec<Crate> = of.par_iter().map(boxed).collect::<Result<_, Cancelled>>()?;
+        let unsorted: Vec<ChartBox> = of.par_iter().map(boxed).collect::<Result<_, Cancelled>>()?;
         // By height, ties by number: no two are equal, so the order is one. Only heights and places are moved about.
-        let height = |(at, c): (usize, &Crate)| (c.size[1] * outlines[c.chart as usize].unit(), at);
-        let mut order: Vec<(f64, usize)> = boxes.par_iter().enumerate().map(height).collect();
+        let height = |(at, c): (usize, &ChartBox)| (c.size[1] * outlines[c.chart as usize].unit(), at);
+        let mut order: Vec<(f64, usize)> = unsorted.par_iter().enumerate().map(height).collect();
         progress.check()?;
         order.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         progress.check()?;
-        let crates = order.into_iter().map(|(_, at)| boxes[at]).collect();
-        Ok(Self { outlines, crates, grid, gap: margin + 2.0 * SAFETY_TEXELS, progress })
+        let boxes = order.into_iter().map(|(_, at)| unsorted[at]).collect();
+        Ok(Self { outlines, boxes, grid, gap: margin + 2.0 * SAFETY_TEXELS, progress })
     }
 
     /// Where each chart goes at a density, in texels to a unit of the chart plane, or `None` where there is no room for all.
@@ -94,7 +94,7 @@ impl<'a> Shelves<'a> {
     /// # Errors
     /// [`Cancelled`].
     pub(super) fn at(&self, density: f64, taken: Option<Taken<'_>>) -> Result<Option<Vec<(usize, Place)>>, Cancelled> {
-        let mut places = Vec::with_capacity(self.crates.len());
+        let mut places = Vec::with_capacity(self.boxes.len());
         let fits = self.fill(density, taken, |c, scale, corner| places.push(self.place(c, scale, corner)))?;
         Ok(fits.then_some(places))
     }
@@ -113,13 +113,13 @@ impl<'a> Shelves<'a> {
         &self,
         density: f64,
         taken: Option<Taken<'_>>,
-        mut put: impl FnMut(&Crate, Scale, [f64; 2]),
+        mut put: impl FnMut(&ChartBox, Scale, [f64; 2]),
     ) -> Result<bool, Cancelled> {
         let mut shelf = Shelf::new(self.grid, taken);
         // Tops and heights are those of the boxes themselves, which keep the safety to the border and the gap to each other.
         let mut height = 0.0;
         let mut next = SAFETY_TEXELS;
-        for (number, c) in self.crates.iter().enumerate() {
+        for (number, c) in self.boxes.iter().enumerate() {
             if number.is_multiple_of(BETWEEN_CHECKS) {
                 self.progress.check()?;
             }
@@ -144,7 +144,7 @@ impl<'a> Shelves<'a> {
         Ok(true)
     }
 
-    fn place(&self, c: &Crate, scale: Scale, corner: [f64; 2]) -> (usize, Place) {
+    fn place(&self, c: &ChartBox, scale: Scale, corner: [f64; 2]) -> (usize, Place) {
         let outline = &self.outlines[c.chart as usize];
         let pose = Pose {
             cos: c.turn[0],
@@ -158,7 +158,7 @@ impl<'a> Shelves<'a> {
     }
 }
 
-impl Crate {
+impl ChartBox {
     fn new(chart: usize, outline: &Outline, [c, s]: [f64; 2]) -> Self {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for p in &outline.points {

@@ -35,24 +35,23 @@ pub(crate) fn unrolling_parts(mesh: &TriMesh, polygon: &[u32], is_manufactured: 
         // A face without area has no normal, and no edge of it is hard.
         areas[f].min(areas[g]) > 0.0 && polygon[f] != polygon[g] && normals[f].dot(&normals[g]) <= least
     };
-    let (part, parts) = connected(mesh, |h| !is_edge(h));
     if areas.iter().all(|area| *area <= 0.0) {
         return Vec::new();
+    }
+    let between_bevels =
+        || if is_manufactured { None } else { walls::planes_and_walls(mesh, polygon, &normals, &areas, &is_edge) };
+    let (part, parts) = connected(mesh, |h| !is_edge(h));
+    if parts < 2 {
+        return between_bevels().unwrap_or_default();
     }
     let mut area = vec![0.0; parts];
     areas.iter().zip(&part).for_each(|(a, p)| area[*p as usize] += a);
     let total: f64 = area.iter().sum();
     let unrolls = unrolling(mesh, &part, parts);
     let unrolled: f64 = (0..parts).filter(|&p| unrolls[p]).map(|p| area[p]).sum();
-    let are_parts = parts > 1 && parts * LEAST_FACES <= mesh.face_count() && unrolled >= LEAST_SHARE * total;
-    if !is_manufactured
-        && !are_parts
-        && let Some(found) = walls::planes_and_walls(mesh, polygon, &normals, &areas, &is_edge)
-    {
+    let are_parts = parts * LEAST_FACES <= mesh.face_count() && unrolled >= LEAST_SHARE * total;
+    if !are_parts && let Some(found) = between_bevels() {
         return found;
-    }
-    if parts < 2 {
-        return Vec::new();
     }
     let is_taken: Vec<bool> = if is_manufactured || are_parts {
         unrolls
@@ -146,60 +145,8 @@ fn plane(normals: &[Vector3<f64>], areas: &[f64], part: &[u32], parts: usize) ->
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::mesh::test_surfaces;
+    use crate::mesh::test_surfaces::{self, turned};
     use nalgebra::{Point3, Rotation3, Vector3};
-    use std::f64::consts::TAU;
-
-    /// Rings of some sides around z, one for each (radius, height).
-    fn rings(sides: usize, profile: &[[f64; 2]]) -> Vec<Point3<f64>> {
-        let ring = |[r, z]: [f64; 2]| {
-            (0..sides).map(move |k| {
-                let (s, c) = (TAU * k as f64 / sides as f64).sin_cos();
-                Point3::new(r * c, r * s, z)
-            })
-        };
-        profile.iter().flat_map(|&p| ring(p)).collect()
-    }
-
-    /// Two triangles for each quad between two rings, and its number for both.
-    fn between_rings(sides: usize, [low, high]: [usize; 2], triangles: &mut Vec<[u32; 3]>, polygon: &mut Vec<u32>) {
-        let at = |row: usize, k: usize| (row * sides + k % sides) as u32;
-        for k in 0..sides {
-            let [a, b, c, d] = [at(low, k), at(low, k + 1), at(high, k + 1), at(high, k)];
-            polygon.extend([triangles.len() as u32 / 2; 2]);
-            triangles.extend([[a, b, c], [a, c, d]]);
-        }
-    }
-
-    /// A body of revolution around z: quads between rings of a profile of (radius, height), caps of one polygon at both ends. Its
-    /// polygons are named in the second list.
-    pub(crate) fn turned(sides: usize, profile: &[[f64; 2]]) -> (TriMesh, Vec<u32>) {
-        let positions = rings(sides, profile);
-        let at = |row: usize, k: usize| (row * sides + k % sides) as u32;
-        let (mut triangles, mut polygon) = (Vec::new(), Vec::new());
-        for row in 0..profile.len() - 1 {
-            between_rings(sides, [row, row + 1], &mut triangles, &mut polygon);
-        }
-        let count = triangles.len() as u32 / 2;
-        for (cap, (row, turn)) in (count..).zip([(0, true), (profile.len() - 1, false)]) {
-            for k in 1..sides - 1 {
-                let [a, b, c] = [at(row, 0), at(row, k), at(row, k + 1)];
-                triangles.push(if turn { [a, c, b] } else { [a, b, c] });
-                polygon.push(cap);
-            }
-        }
-        (test_surfaces::mesh(&positions, &triangles), polygon)
-    }
-
-    /// The same of a profile that is closed, without caps.
-    pub(crate) fn tube(sides: usize, profile: &[[f64; 2]]) -> (TriMesh, Vec<u32>) {
-        let positions = rings(sides, profile);
-        let (mut triangles, mut polygon) = (Vec::new(), Vec::new());
-        for row in 0..profile.len() {
-            between_rings(sides, [row, (row + 1) % profile.len()], &mut triangles, &mut polygon);
-        }
-        (test_surfaces::mesh(&positions, &triangles), polygon)
-    }
 
     pub(crate) fn moved(mesh: &TriMesh) -> TriMesh {
         let turn = Rotation3::new(Vector3::new(0.3, -1.1, 0.7));
