@@ -24,6 +24,7 @@ def _mesh(selection, cut, follow):
             "corner_triangles": selection.corner_triangles,
             "seams": selection.marked(cut),
             "guides": selection.marked(follow),
+            "seam_weights": selection.seam_weights,
         },
     )
 

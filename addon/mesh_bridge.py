@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from . import seams, uv_maps
+from . import painted, seams, uv_maps
 from .faces import chosen_faces
 from .mesh_arrays import (
     MeshError,
@@ -55,6 +55,7 @@ class Selection:
     face_offsets: np.ndarray  # (f + 1,) int32
     corner_triangles: np.ndarray | None  # (t, 3) int32 corners; None: only triangles
     marks: dict[str, np.ndarray]  # of each kind in MARKS the edges that have it, (m, 2) int32 vertices
+    seam_weights: np.ndarray | None  # (n,) float32, what a seam at each vertex counts for; None: its length everywhere
     warnings: list[str] = field(default_factory=list)
 
     def marked(self, kinds):
@@ -82,14 +83,25 @@ def unique_meshes(objects):
     return result
 
 
-def gather(objects, *, only_selected=False, by_uv=False, target=ACTIVE_MAP, move_pinned=True, sharp_angle=ONLY_MARKED):
+def gather(
+    objects,
+    *,
+    only_selected=False,
+    by_uv=False,
+    target=ACTIVE_MAP,
+    move_pinned=True,
+    sharp_angle=ONLY_MARKED,
+    seams_away="",
+    seams_here="",
+):
     """Reads the objects' base meshes (before modifiers and shape keys) as one `Selection`.
 
     `only_selected` and `by_uv` as in `chosen_faces`; they matter for objects in edit mode. `target` is the UV map that
-    will be written, `sharp_angle` is in degrees. Raises `MeshError` where the map cannot be written, or where pinned
+    will be written, `sharp_angle` is in degrees, `seams_away` and `seams_here` name what is painted (`painted`). Raises
+    `MeshError` where the map cannot be written, or where pinned
     UVs would be moved and may not be.
     """
-    warnings, parts, blocks, reasons = [], [], [], []
+    warnings, parts, blocks, reasons, found = [], [], [], [], set()
     vertex_base = corner_base = face_base = 0
     for obj in objects:
         mesh = obj.data
@@ -106,6 +118,8 @@ def gather(objects, *, only_selected=False, by_uv=False, target=ACTIVE_MAP, move
         block = read_mesh(mesh, chosen, sharp_angle)
         if not move_pinned:
             uv_maps.check_pins(obj, target, block["source_corners"])
+        weights, names = painted.seam_weights(obj, seams_away, seams_here)
+        found |= names
         positions, note = scale_as_in_scene(block["positions"], obj.matrix_world)
         if note:
             warnings.append(f"{obj.name}: {note}")
@@ -129,6 +143,7 @@ def gather(objects, *, only_selected=False, by_uv=False, target=ACTIVE_MAP, move
                 block["corner_vertices"] + vertex_base,
                 block["face_sizes"],
                 block["triangles"] + corner_base,
+                weights if block["source_vertices"] is None else weights[block["source_vertices"]],
                 *(block["marks"][kind] + vertex_base for kind in MARKS),
             )
         )
@@ -139,7 +154,10 @@ def gather(objects, *, only_selected=False, by_uv=False, target=ACTIVE_MAP, move
         raise reasons[0] if reasons else NothingToUnwrap("There are no faces to unwrap")
     if max(vertex_base, corner_base) > np.iinfo(np.int32).max:
         raise MeshError("The selection is too large: more than two thousand million corners")
-    positions, corner_vertices, sizes, triangles, *marks = (
+    if missing := [name for name in (seams_away, seams_here) if name and name not in found]:
+        names = " or ".join(f'"{name}"' for name in missing)
+        warnings.append(f"There is no vertex group and no attribute of one number a point named {names}")
+    positions, corner_vertices, sizes, triangles, weights, *marks = (
         np.concatenate(column) for column in zip(*blocks, strict=True)
     )
     offsets = np.zeros(len(sizes) + 1, np.int32)
@@ -150,6 +168,7 @@ def gather(objects, *, only_selected=False, by_uv=False, target=ACTIVE_MAP, move
         corner_vertices=np.ascontiguousarray(corner_vertices, np.int32),
         face_offsets=offsets,
         corner_triangles=None if (sizes == 3).all() else np.ascontiguousarray(triangles, np.int32),
+        seam_weights=np.ascontiguousarray(weights, np.float32) if found else None,
         marks={kind: np.ascontiguousarray(edges, np.int32) for kind, edges in zip(MARKS, marks, strict=True)},
         warnings=warnings,
     )
@@ -164,7 +183,7 @@ def read_mesh(mesh, chosen, sharp_angle=ONLY_MARKED):
     marks = read_marks(mesh, sizes, sharp_angle)
     mesh.calc_loop_triangles()
     triangles = read_array(mesh.loop_triangles, "loops", np.int32, 3)
-    source_faces = source_corners = None
+    source_faces = source_corners = source_vertices = None
     if chosen is not None:
         source_faces = np.flatnonzero(chosen).astype(np.int32)
         corner_chosen = np.repeat(chosen, sizes)
@@ -173,11 +192,12 @@ def read_mesh(mesh, chosen, sharp_angle=ONLY_MARKED):
         corner_vertices = corner_vertices[source_corners]
         vertex_chosen = np.zeros(len(positions), bool)
         vertex_chosen[corner_vertices] = True
+        source_vertices = np.flatnonzero(vertex_chosen)
         corner_vertices = renumber(corner_vertices, vertex_chosen)
         marks = {
             kind: renumber(edges[vertex_chosen[edges].all(axis=1)], vertex_chosen) for kind, edges in marks.items()
         }
-        positions = positions[vertex_chosen]
+        positions = positions[source_vertices]
         sizes = sizes[source_faces]
     return {
         "positions": positions,
@@ -187,6 +207,7 @@ def read_mesh(mesh, chosen, sharp_angle=ONLY_MARKED):
         "marks": marks,
         "source_faces": source_faces,
         "source_corners": source_corners,
+        "source_vertices": source_vertices,
     }
 
 

@@ -8,6 +8,7 @@ from . import last_result, properties, targets
 
 CATEGORY = "BLE Unwrap"
 STATUS_ICONS = {"HEAD": "DOT", "OK": "CHECKMARK", "BAD": "ERROR", "WARN": "INFO", "INFO": "BLANK1"}
+PAINTED = ("seams_away", "seams_here")  # settings that name a vertex group
 LINE_CHARACTERS = 36  # of a line of the panel at its usual width
 
 
@@ -17,7 +18,11 @@ def draw_settings(layout, context, names):
     layout.use_property_decorate = False
     column = layout.column()
     for name in panel_settings(settings, context, names):
-        column.prop(settings, name)
+        obj = context.active_object
+        if name in PAINTED and obj is not None and obj.type == "MESH":
+            column.prop_search(settings, name, obj, "vertex_groups")
+        else:
+            column.prop(settings, name)
 
 
 def panel_settings(settings, context, names):

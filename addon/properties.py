@@ -111,6 +111,22 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         description="Where a chart needs a border, draw it to borders between materials",
         default=True,
     )
+    seams_away: StringProperty(
+        name="Keep Seams Away",
+        description=(
+            "A vertex group, or an attribute of one number a point, that says where seams are to keep away: at a weight "
+            "of 1 a seam counts for ten times its length"
+        ),
+        default="",
+    )
+    seams_here: StringProperty(
+        name="Seams Here",
+        description=(
+            "A vertex group, or an attribute of one number a point, that says where seams are welcome: at a weight of 1 "
+            "a seam counts for a tenth of its length"
+        ),
+        default="",
+    )
     use_selection: BoolProperty(
         name="Only Selected",
         description=(
@@ -209,7 +225,7 @@ BRIDGE_SETTINGS = tuple(
 # What means something for surfaces only, or for clouds only; the other one's functions do not take it.
 SURFACE_SETTINGS = (
     *("use_seams", "use_sharp", "use_materials", "sharp_angle"),
-    *("follow_seams", "follow_sharp", "follow_materials", "mark_seams"),
+    *("follow_seams", "follow_sharp", "follow_materials", "seams_away", "seams_here", "mark_seams"),
     *("move_pinned", "correct_aspect"),
     *sorted(settings_table.taken_by("unwrap") - settings_table.taken_by("unwrap_points")),
 )
@@ -224,7 +240,7 @@ ADVANCED_SETTINGS = (
         (
             *("use_sharp", "use_materials", "sharp_angle"),
             *("follow_seams", "follow_sharp", "follow_materials", "crease_weight"),
-            *("hide_seams", "front", "symmetry", "style", "straighten"),
+            *("seams_away", "seams_here", "hide_seams", "front", "symmetry", "style", "straighten"),
         ),
     ),
     (

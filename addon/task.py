@@ -58,7 +58,7 @@ class UnwrapTask:
             by_uv=by_uv,
             target=self.target,
             move_pinned=self.settings["move_pinned"],
-            sharp_angle=self.settings["sharp_angle"],
+            **{name: self.settings[name] for name in ("sharp_angle", "seams_away", "seams_here")},
         )
         self.native = properties.native_values(settings, properties.CLOUD_SETTINGS)
         self.native |= {name: self.settings[name] for name in properties.KEPT_BY_PRESETS}

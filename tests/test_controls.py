@@ -29,6 +29,20 @@ def sides(mesh, keep):
     return np.unique(ends[keep[ends].all(axis=1)], axis=0).astype(np.int32)
 
 
+def seam_middles(mesh, uv):
+    """The middles of the sides of two faces at which UVs differ, (s, 3)."""
+    positions, corners, offsets = mesh
+    following = np.arange(1, len(corners) + 1)
+    following[offsets[1:] - 1] = offsets[:-1]
+    ends = np.stack([corners, corners[following]], axis=1)
+    found = {}
+    for (a, b), here, there in zip(ends.tolist(), uv.tolist(), uv[following].tolist(), strict=True):
+        side, lies = ((a, b), (here, there)) if a < b else ((b, a), (there, here))
+        found.setdefault(side, []).append(lies)
+    seams = [side for side, lies in found.items() if len(lies) > 1 and any(lie != lies[0] for lie in lies)]
+    return positions[np.array(seams, int).reshape(-1, 2)].mean(axis=1)
+
+
 def borders(mesh, chart):
     """The sides with a chart of their own on either side."""
     _, corners, offsets = mesh
@@ -64,6 +78,57 @@ def test_guides_cut_nothing_that_needs_no_border(hill):
     assert report["charts"] == 1
     cut = unwrap(*hill, seams=sides(hill, hill[0][:, 0] == 0.5)).report
     assert cut["charts"] == 2, "seams are cut"
+
+
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+def test_seams_run_where_they_are_welcome_and_keep_away_from_where_they_are_not(blob, real):
+    x = blob[0][:, 0]
+    share = {}
+    for weight in (10.0, 1.0, 0.1):
+        painted = np.where(x > 0.1, weight, 1.0).astype(real)
+        middles = seam_middles(blob, arrays(unwrap(*blob, seam_weights=painted))[0])
+        share[weight] = (middles[:, 0] > 0.1).mean()
+    assert share[10.0] < 0.15 < 0.3 < share[1.0] < 0.6 < 0.7 < share[0.1], share
+
+
+def test_seams_stay_mirrored_where_one_side_is_painted():
+    positions, corners, offsets = conftest.sphere(32, 24)
+    x, y, z = positions.T
+    radius = 1 + 0.3 * np.cos(3 * z + 1) + 0.2 * np.sin(4 * y)  # left and right alike, the others not
+    body = positions * radius[:, None], corners, offsets
+    painted = np.where((x > 0.3) & (y > 0.2), 50.0, 1.0)
+    middles = seam_middles(body, arrays(unwrap(*body, seam_weights=painted))[0])
+    assert len(middles)
+    assert {tuple(m) for m in (middles * (-1, 1, 1)).round(6) + 0.0} == {tuple(m) for m in middles.round(6) + 0.0}
+    assert not ((abs(middles[:, 0]) > 0.5) & (middles[:, 1] > 0.4)).any(), "they keep away on both sides"
+
+
+def test_like_parts_that_are_painted_differently_are_no_copies(ball):
+    positions, corners, offsets = ball
+    count = len(positions)
+    both = (
+        np.concatenate([positions, positions + (5, 0, 0)]),
+        np.concatenate([corners, corners + count]),
+        np.concatenate([offsets, offsets[1:] + offsets[-1]]),
+    )
+    plain = unwrap(*both)
+    assert plain.report["rungs"]["copied"] == 1
+    painted = np.ones(2 * count)
+    painted[count:][positions[:, 0] > 0.1] = 10.0
+    atlas = unwrap(*both, seam_weights=painted)
+    assert "copied" not in atlas.report["rungs"]
+    middles = seam_middles(both, arrays(atlas)[0])
+    assert not (middles[:, 0] > 5.3).any()
+
+
+def test_wrong_seam_weights_are_named(square):
+    with pytest.raises(native.InvalidArgumentError, match=r"seam_weights: .* of shape \(n,\)"):
+        native.unwrap(*square, seam_weights=np.ones((4, 1)))
+    with pytest.raises(native.InvalidMeshError, match="3 seam weights, but 4 vertices"):
+        native.unwrap(*square, seam_weights=np.ones(3))
+    for wrong in (0.0, -1.0, 1001.0, np.nan):
+        with pytest.raises(native.InvalidMeshError, match="seam weight of vertex 2 is not a number from 0.001 to 1000"):
+            native.unwrap(*square, seam_weights=np.array([1.0, 1.0, wrong, 1.0]))
 
 
 def test_wrong_guides_are_named(square):
@@ -147,8 +212,9 @@ def test_an_analysis_keeps_marks_and_welding(ball):
     same(analysis.unwrap(**QUICK), unwrap(*split, weld=True))
     with pytest.raises(native.InvalidArgumentError, match="weld is false; it must be true, as in the analysis"):
         analysis.unwrap(weld=False)
-    for name in ("seams", "guides"):
-        given = {name: marks}
+    weights = np.where(positions[:, 0] > 0.1, 10.0, 1.0)
+    for name, value in {"seams": marks, "guides": marks, "seam_weights": weights}.items():
+        given = {name: value}
         same(native.analyse(*ball, **given).unwrap(**QUICK), unwrap(*ball, **given))
 
 

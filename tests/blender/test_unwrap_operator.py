@@ -327,6 +327,53 @@ def test_all_that_is_marked_is_cut_where_that_is_wished(kind):
     assert fingerprint(obj) == before
 
 
+def painted_ball(kind):
+    """A ball with half of it in a vertex group or an attribute of the name "Painted"."""
+    obj = sphere(cells=10)
+    for vertex in obj.data.vertices:  # neither side is like the other
+        x, y, z = vertex.co
+        vertex.co *= 1 + 0.25 * np.sin(3 * x + 1) * np.cos(2 * y + 0.5) + 0.2 * np.sin(4 * z + x)
+    half = [v.index for v in obj.data.vertices if v.co.x > 0.1 * obj.dimensions.x]
+    if kind == "group":
+        obj.vertex_groups.new(name="Painted").add(half, 1.0, "REPLACE")
+    else:
+        attribute = obj.data.attributes.new("Painted", "FLOAT", "POINT")
+        for index in half:
+            attribute.data[index].value = 1.0
+    return obj, set(half)
+
+
+def seam_share(obj, vertices):
+    """The share of the seams' edges that lie between these vertices."""
+    cut = [edge for edge in obj.data.edges if is_cut(obj, edge.index)]
+    return sum(vertices.issuperset(edge.vertices) for edge in cut) / len(cut)
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+@pytest.mark.parametrize("kind", ["group", "attribute"])
+def test_seams_keep_away_from_what_is_painted_or_run_there(kind, mode):
+    obj, half = painted_ball(kind)
+    before = fingerprint(obj)
+    share = {}
+    for name in ("seams_away", "seams_here"):
+        if mode == "EDIT":
+            edit(obj)
+        unwrap(**{name: "Painted"})
+        bpy.ops.object.mode_set(mode="OBJECT")
+        share[name] = seam_share(obj, half)
+        assert_good(obj)
+    assert share["seams_away"] < 0.1 < 0.6 < share["seams_here"], share
+    if mode == "OBJECT":
+        assert fingerprint(obj) == before
+
+
+def test_a_painted_group_that_is_not_there_is_named():
+    obj, _ = painted_ball("group")
+    unwrap(seams_away="Painted", seams_here="Nowhere")
+    texts = [text for status, text in certificate() if status == "WARN"]
+    assert any('"Nowhere"' in text and '"Painted"' not in text for text in texts), texts
+
+
 def test_edges_over_an_angle_are_cut():
     obj = cube()
     unwrap(use_sharp=True, sharp_angle=89.0)

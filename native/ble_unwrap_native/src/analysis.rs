@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 use crate::errors::Failure;
 use crate::job::Job;
 use crate::settings::{self, Call};
-use crate::unwrap::{MeshArrays, to_python};
+use crate::unwrap::{MeshArrays, Wishes, to_python};
 
 /// A mesh made ready to be unwrapped with several settings, one after another.
 ///
@@ -109,7 +109,7 @@ impl Analysis {
 ///
 /// Parameters
 /// ----------
-/// positions, corner_vertices, face_offsets, corner_triangles, seams, guides
+/// positions, corner_vertices, face_offsets, corner_triangles, seams, guides, seam_weights
 ///     The mesh, as in ``unwrap``.
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
@@ -134,7 +134,7 @@ impl Analysis {
 /// InvalidMeshError
 ///     If indices or offsets do not make a mesh. The text names the first wrong element.
 #[pyfunction]
-#[pyo3(signature = (positions, corner_vertices, face_offsets, *, corner_triangles=None, seams=None, guides=None, job=None, **settings))]
+#[pyo3(signature = (positions, corner_vertices, face_offsets, *, corner_triangles=None, seams=None, guides=None, seam_weights=None, job=None, **settings))]
 pub(crate) fn analyse(
     py: Python<'_>,
     positions: &Bound<'_, PyAny>,
@@ -143,11 +143,13 @@ pub(crate) fn analyse(
     corner_triangles: Option<&Bound<'_, PyAny>>,
     seams: Option<&Bound<'_, PyAny>>,
     guides: Option<&Bound<'_, PyAny>>,
+    seam_weights: Option<&Bound<'_, PyAny>>,
     job: Option<Bound<'_, Job>>,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
     let call = settings::from_keywords(settings, Function::Analyse)?;
-    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, seams, guides)?;
+    let wishes = Wishes { seams, guides, seam_weights };
+    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, wishes)?;
     let job = Job::given_or_new(py, job)?;
     let work = move |progress: &_| {
         ble_unwrap_core::Analysis::new(&mesh.input(), &call.settings, progress).map_err(Failure::from)

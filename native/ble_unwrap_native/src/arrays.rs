@@ -67,6 +67,11 @@ pub(crate) fn reals(object: &Bound<'_, PyAny>, argument: Argument) -> PyResult<V
     Ok(values)
 }
 
+/// Real numbers rounded to float32, from float32 or float64 of shape (n,).
+pub(crate) fn singles(object: &Bound<'_, PyAny>, argument: Argument) -> PyResult<Vec<f32>> {
+    Ok(reals(object, argument)?.into_iter().map(|x| x as f32).collect())
+}
+
 /// Indices, from int32 or int64 of shape (n,); an int64 must fit 32 bits.
 pub(crate) fn indices(object: &Bound<'_, PyAny>, argument: Argument) -> PyResult<Vec<i32>> {
     let view = View::new(object, argument, INDICES)?;

@@ -10,7 +10,7 @@ use crate::errors::{Failure, InvalidArgumentError};
 use crate::job::Job;
 use crate::owned_array::Array;
 use crate::settings;
-use crate::unwrap::MeshArrays;
+use crate::unwrap::{MeshArrays, Wishes};
 
 /// Distances along a surface from some vertices to all.
 ///
@@ -62,7 +62,7 @@ pub(crate) fn geodesic_distances(
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
     let call = settings::from_keywords(settings, Function::GeodesicDistances)?;
-    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, None, None)?;
+    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, Wishes::default())?;
     let sources = arrays::indices(sources, Argument { name: "sources", shape: "(k,)" })?;
     let shape = [sources.len(), mesh.vertex_count()];
     let job = Job::given_or_new(py, job)?;

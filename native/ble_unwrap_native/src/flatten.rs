@@ -10,7 +10,7 @@ use crate::job::Job;
 use crate::owned_array::{Array, Reduced};
 use crate::report;
 use crate::settings;
-use crate::unwrap::MeshArrays;
+use crate::unwrap::{MeshArrays, Wishes};
 
 /// A patch in the plane, before and after its stretch was minimised.
 ///
@@ -125,7 +125,7 @@ pub(crate) fn flatten(
 ) -> PyResult<Py<PyAny>> {
     let call = settings::from_keywords(settings, Function::Flatten)?;
     let minimise = minimise.map_or(Ok(true), |given| settings::flag("minimise", given))?;
-    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, None, None)?;
+    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, Wishes::default())?;
     let job = Job::given_or_new(py, job)?;
     job.get().start(
         call.threads,

@@ -10,7 +10,7 @@ use crate::errors::Failure;
 use crate::job::Job;
 use crate::report;
 use crate::settings;
-use crate::unwrap::MeshArrays;
+use crate::unwrap::{MeshArrays, Wishes};
 
 /// Measure the quality of a UV map, whoever made it.
 ///
@@ -74,7 +74,7 @@ pub(crate) fn measure(
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
     let call = settings::from_keywords(settings, Function::Measure)?;
-    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, None, None)?;
+    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, Wishes::default())?;
     let uv = arrays::single_rows(uv, Argument { name: "uv", shape: "(c, 2)" })?;
     let chart = chart.map(|given| arrays::indices(given, Argument { name: "chart", shape: "(f,)" })).transpose()?;
     let job = Job::given_or_new(py, job)?;

@@ -68,6 +68,15 @@ pub(crate) struct MeshArrays {
     corner_triangles: Option<Vec<[i32; 3]>>,
     seams: Vec<[i32; 2]>,
     guides: Vec<[i32; 2]>,
+    seam_weights: Option<Vec<f32>>,
+}
+
+/// What says where seams should be, as an unwrap takes it.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Wishes<'a, 'py> {
+    pub(crate) seams: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) guides: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) seam_weights: Option<&'a Bound<'py, PyAny>>,
 }
 
 impl MeshArrays {
@@ -77,10 +86,10 @@ impl MeshArrays {
         corner_vertices: &Bound<'_, PyAny>,
         face_offsets: &Bound<'_, PyAny>,
         corner_triangles: Option<&Bound<'_, PyAny>>,
-        seams: Option<&Bound<'_, PyAny>>,
-        guides: Option<&Bound<'_, PyAny>>,
+        wishes: Wishes<'_, '_>,
     ) -> PyResult<Self> {
         let triangles = Argument { name: "corner_triangles", shape: "(t, 3)" };
+        let weights = Argument { name: "seam_weights", shape: "(n,)" };
         let pairs = |given: Option<&Bound<'_, PyAny>>, argument| {
             given.map(|given| arrays::index_rows(given, argument)).transpose().map(Option::unwrap_or_default)
         };
@@ -89,8 +98,9 @@ impl MeshArrays {
             corner_vertices: arrays::indices(corner_vertices, Argument { name: "corner_vertices", shape: "(c,)" })?,
             face_offsets: arrays::indices(face_offsets, Argument { name: "face_offsets", shape: "(f + 1,)" })?,
             corner_triangles: corner_triangles.map(|given| arrays::index_rows(given, triangles)).transpose()?,
-            seams: pairs(seams, Argument { name: "seams", shape: "(s, 2)" })?,
-            guides: pairs(guides, Argument { name: "guides", shape: "(g, 2)" })?,
+            seams: pairs(wishes.seams, Argument { name: "seams", shape: "(s, 2)" })?,
+            guides: pairs(wishes.guides, Argument { name: "guides", shape: "(g, 2)" })?,
+            seam_weights: wishes.seam_weights.map(|given| arrays::singles(given, weights)).transpose()?,
         })
     }
 
@@ -103,6 +113,7 @@ impl MeshArrays {
             corner_triangles: self.corner_triangles.as_deref(),
             seams: &self.seams,
             guides: &self.guides,
+            seam_weights: self.seam_weights.as_deref(),
         }
     }
 
@@ -140,6 +151,9 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 ///     Edges to be cut, by their two vertices. Pairs that are no edge do nothing.
 /// guides : (g, 2) int32 or int64, optional
 ///     Edges that borders of charts follow where a border is needed, such as sharp edges and borders of materials.
+/// seam_weights : (n,) float32 or float64, optional
+///     What a seam at each vertex counts for, as a multiple of its length, 0.001 to 1000: more than 1 where seams are to keep away, less where
+///     they are welcome. A surface that is symmetric stays so: there a vertex and its mirror image count for their geometric mean.
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
 #[doc = include_str!("settings.txt")]
@@ -188,7 +202,7 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 /// Source: Bernoulli Embedding Model and Its Application in Texture Mapping, 2006, with the extensions that
 /// native/ARCHITECTURE.md describes.
 #[pyfunction]
-#[pyo3(signature = (positions, corner_vertices, face_offsets, *, corner_triangles=None, seams=None, guides=None, job=None, **settings))]
+#[pyo3(signature = (positions, corner_vertices, face_offsets, *, corner_triangles=None, seams=None, guides=None, seam_weights=None, job=None, **settings))]
 pub(crate) fn unwrap(
     py: Python<'_>,
     positions: &Bound<'_, PyAny>,
@@ -197,12 +211,23 @@ pub(crate) fn unwrap(
     corner_triangles: Option<&Bound<'_, PyAny>>,
     seams: Option<&Bound<'_, PyAny>>,
     guides: Option<&Bound<'_, PyAny>>,
+    seam_weights: Option<&Bound<'_, PyAny>>,
     job: Option<Bound<'_, Job>>,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
-    submit_unwrap(py, positions, corner_vertices, face_offsets, corner_triangles, seams, guides, job, settings)?
-        .get()
-        .finish(py)
+    let job = submit_unwrap(
+        py,
+        positions,
+        corner_vertices,
+        face_offsets,
+        corner_triangles,
+        seams,
+        guides,
+        seam_weights,
+        job,
+        settings,
+    )?;
+    job.get().finish(py)
 }
 
 /// Start ``unwrap`` on a thread of its own and return the job at once.
@@ -221,7 +246,7 @@ pub(crate) fn unwrap(
 ///     If an array has the wrong type or shape, or a setting is unknown or out of range. All other errors, including
 ///     ``InvalidMeshError``, are raised by ``Job.result``.
 #[pyfunction]
-#[pyo3(signature = (positions, corner_vertices, face_offsets, *, corner_triangles=None, seams=None, guides=None, job=None, **settings))]
+#[pyo3(signature = (positions, corner_vertices, face_offsets, *, corner_triangles=None, seams=None, guides=None, seam_weights=None, job=None, **settings))]
 pub(crate) fn submit_unwrap<'py>(
     py: Python<'py>,
     positions: &Bound<'py, PyAny>,
@@ -230,11 +255,13 @@ pub(crate) fn submit_unwrap<'py>(
     corner_triangles: Option<&Bound<'py, PyAny>>,
     seams: Option<&Bound<'py, PyAny>>,
     guides: Option<&Bound<'py, PyAny>>,
+    seam_weights: Option<&Bound<'py, PyAny>>,
     job: Option<Bound<'py, Job>>,
     settings: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, Job>> {
     let call = settings::from_keywords(settings, Function::Unwrap)?;
-    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, seams, guides)?;
+    let wishes = Wishes { seams, guides, seam_weights };
+    let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, wishes)?;
     let job = Job::given_or_new(py, job)?;
     let work =
         move |progress: &_| ble_unwrap_core::unwrap(&mesh.input(), &call.settings, progress).map_err(Failure::from);

@@ -4,6 +4,8 @@
 //! So every seam has a mirror image that is a seam, and the work is done once. What is joined in the plane stays symmetric: of
 //! its cuts only those in the plane itself are closed.
 
+use std::sync::Arc;
+
 use crate::cache::Run;
 use crate::charts::{Chart, Patch};
 use crate::flattening::{Rung, Rungs};
@@ -64,6 +66,8 @@ pub(super) fn charts(
     of_half: &OfHalf<'_>,
     run: &Run<'_>,
 ) -> Result<Option<(Vec<Chart>, Rungs)>, Cancelled> {
+    let even = Arc::new(mirror.with_even_seam_weights(&whole.mesh));
+    let whole = &Patch::whole(even, whole.polygon.clone());
     let (mesh, polygon) = (&whole.mesh, &whole.polygon);
     let faces = mirror.first_half();
     let half = Patch::of_surface(mesh, polygon, faces.clone());

@@ -26,6 +26,17 @@ pub struct MeshInput<'a> {
     pub seams: &'a [[i32; 2]],
     /// Pairs of vertices. The edge between the two is a good place for a seam, where one is needed.
     pub guides: &'a [[i32; 2]],
+    /// What a seam at each vertex counts for, as a multiple of its length, from [`LEAST_SEAM_WEIGHT`](Self::LEAST_SEAM_WEIGHT) to
+    /// [`LARGEST_SEAM_WEIGHT`](Self::LARGEST_SEAM_WEIGHT): more than 1 where seams are to keep away, less where they are welcome. Where absent, 1
+    /// everywhere. Of vertices that are welded, one counts. Where seams are mirrored, a vertex and its mirror image count for their geometric mean.
+    pub seam_weights: Option<&'a [f32]>,
+}
+
+impl MeshInput<'_> {
+    /// The least weight of seams at a vertex: they are as good as free there.
+    pub const LEAST_SEAM_WEIGHT: f32 = 1e-3;
+    /// The largest weight of seams at a vertex: they run there only where there is no other way.
+    pub const LARGEST_SEAM_WEIGHT: f32 = 1e3;
 }
 
 /// Why a mesh cannot be unwrapped at all. Numbers of elements count from 0, as the arrays do.
@@ -134,6 +145,24 @@ pub enum MeshError {
         /// Number of vertices.
         vertex_count: usize,
     },
+    /// The number of weights of seams is not the number of vertices.
+    #[error("there are {found} seam weights, but {vertices} vertices; give one a vertex")]
+    SeamWeightCount {
+        /// Number of weights that were given.
+        found: usize,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// A weight of seams is no number, or out of its range.
+    #[error(
+        "the seam weight of vertex {vertex} is not a number from {} to {}; correct it",
+        MeshInput::LEAST_SEAM_WEIGHT,
+        MeshInput::LARGEST_SEAM_WEIGHT
+    )]
+    SeamWeight {
+        /// The vertex.
+        vertex: usize,
+    },
     /// There are more elements of one kind than can be numbered.
     #[error("the mesh has {count} {element}, more than the {limit} that can be numbered; split it into several meshes")]
     TooLarge {
@@ -174,6 +203,8 @@ impl MeshError {
             | Self::TriangleAcrossFaces { .. }
             | Self::SeamOutOfRange { .. }
             | Self::GuideOutOfRange { .. }
+            | Self::SeamWeightCount { .. }
+            | Self::SeamWeight { .. }
             | Self::TooLarge { .. }
             | Self::NoFiniteFace { .. } => ErrorKind::Mesh,
             Self::Cancelled(error) => error.kind(),
@@ -196,7 +227,7 @@ pub(super) struct Polygons<'a> {
 }
 
 impl<'a> Polygons<'a> {
-    /// Checks sizes, offsets, vertex indices, seams and guides; O(n). Triangles are checked where they are
+    /// Checks sizes, offsets, vertex indices, seams, guides and weights of seams; O(n). Triangles are checked where they are
     /// sorted to their faces.
     pub(super) fn new(input: &MeshInput<'a>) -> Result<Self, MeshError> {
         let vertex_count = input.positions.len();
@@ -249,6 +280,15 @@ impl<'a> Polygons<'a> {
         }
         if let Some((guide, vertex)) = outside(input.guides) {
             return Err(MeshError::GuideOutOfRange { guide, vertex, vertex_count });
+        }
+        if let Some(weights) = input.seam_weights {
+            if weights.len() != vertex_count {
+                return Err(MeshError::SeamWeightCount { found: weights.len(), vertices: vertex_count });
+            }
+            let range = MeshInput::LEAST_SEAM_WEIGHT..=MeshInput::LARGEST_SEAM_WEIGHT;
+            if let Some(vertex) = weights.iter().position(|weight| !range.contains(weight)) {
+                return Err(MeshError::SeamWeight { vertex });
+            }
         }
         Ok(Self { corner_vertices: input.corner_vertices, face_offsets: input.face_offsets, polygon_of_corner })
     }
@@ -342,5 +382,24 @@ mod tests {
         let error = Polygons::new(&MeshInput { seams: &[], guides: &seams, ..input }).expect_err("nor for a guide");
         assert_eq!(error, MeshError::GuideOutOfRange { guide: 1, vertex: 7, vertex_count: 4 });
         assert!(error.to_string().contains("guide 1 names vertex 7"), "{error}");
+    }
+
+    #[test]
+    fn weights_of_seams_are_checked() {
+        let found = |weights: &[f32]| {
+            let input = MeshInput {
+                positions: &SQUARE,
+                corner_vertices: &[0, 1, 2],
+                face_offsets: &[0, 3],
+                seam_weights: Some(weights),
+                ..MeshInput::default()
+            };
+            Polygons::new(&input).map(|p| p.len())
+        };
+        assert_eq!(found(&[1.0, 10.0, 0.001, 1000.0]), Ok(1));
+        assert_eq!(found(&[1.0; 3]), Err(MeshError::SeamWeightCount { found: 3, vertices: 4 }));
+        for wrong in [0.0, -1.0, 1001.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(found(&[1.0, 1.0, wrong, 1.0]), Err(MeshError::SeamWeight { vertex: 2 }), "{wrong}");
+        }
     }
 }

@@ -52,6 +52,20 @@ impl Mirror {
         farthest_apart(mesh.halfedges().filter_map(pair))
     }
 
+    /// The mesh on which a seam at each vertex counts for the geometric mean of what it counts for there and at its mirror image: seams come in
+    /// pairs, and what is wished of one side only is to hold for both.
+    pub(crate) fn with_even_seam_weights(&self, mesh: &TriMesh) -> TriMesh {
+        let mut image: Vec<VertexId> = mesh.vertices().collect();
+        for h in mesh.halfedges().filter(|&h| !self.likeness.image(h).is_none()) {
+            // A side runs the other way in the mirror.
+            image[mesh.from(h).index()] = mesh.to(self.likeness.image(h));
+        }
+        let vertices: Vec<VertexId> = mesh.vertices().collect();
+        let pairs = mesh.seam_weights_of(&vertices).into_iter().zip(mesh.seam_weights_of(&image));
+        let even = pairs.map(|(here, there)| (here * there).sqrt()).collect();
+        mesh.clone().with_seam_weights(even)
+    }
+
     /// Whether an edge lies in the mirror plane, where the two halves meet.
     pub(crate) fn is_between(&self, mesh: &TriMesh, h: HalfedgeId) -> bool {
         !mesh.is_boundary(h) && self.likeness.image(h) == mesh.twin(h)
@@ -161,6 +175,23 @@ mod tests {
             );
             assert_eq!(mirror.is_between(&mesh, h), on_plane(mesh.from(h)) && on_plane(mesh.to(h)));
         }
+    }
+
+    #[test]
+    fn a_seam_counts_for_as_much_as_its_mirror_image() {
+        let (mesh, polygon) = sheet(8, |x, y| (x - 4.0).powi(2) * 0.1 + 0.3 * y + 0.05 * y * y);
+        let weight = |p: &Point3<f64>| (1.0 + p.x + 10.0 * p.y) as f32;
+        let mesh = mesh.clone().with_seam_weights(mesh.positions().iter().map(weight).collect());
+        let even = found(&mesh, &polygon).expect("a plane at x = 4").with_even_seam_weights(&mesh);
+        let vertices: Vec<VertexId> = mesh.vertices().collect();
+        for (v, found) in vertices.iter().zip(even.seam_weights_of(&vertices)) {
+            let p = mesh.position(*v);
+            let there = weight(&Point3::new(8.0 - p.x, p.y, 0.0));
+            assert!((found.powi(2) - weight(&p) * there).abs() < 1e-4 * weight(&p) * there, "{p}: {found}");
+        }
+        let (plain, _) = sheet(8, |x, y| (x - 4.0).powi(2) * 0.1 + 0.3 * y + 0.05 * y * y);
+        let even = found(&plain, &polygon).expect("a plane at x = 4").with_even_seam_weights(&plain);
+        assert!(even.seam_weights_of(&vertices).is_empty(), "where all count alike nothing is kept");
     }
 
     #[test]

@@ -10,6 +10,7 @@ use crate::clock::Clock;
 use crate::error::UnwrapError;
 use crate::mesh::{self, ConditionOptions, FaceId, Groups, MeshInput, Surface};
 use crate::progress::{Cancelled, Progress, Stage};
+use crate::cutting::AtVertices;
 use crate::settings::Settings;
 use crate::{cutting, layout, visibility};
 
@@ -21,6 +22,8 @@ pub(super) struct Prepared {
     pub(super) surface: Surface,
     /// The faces of each piece, ascending. The pieces become meshes of their own only while they are charted.
     pub(super) components: Groups<FaceId>,
+    /// What a seam at each vertex of the surface counts for, by the wish of the user; `None` where there is none.
+    painted: Option<Vec<f32>>,
 }
 
 impl Prepared {
@@ -31,7 +34,9 @@ impl Prepared {
     ) -> Result<Self, UnwrapError> {
         let surface = mesh::canonical(mesh::condition(input, conditioning, progress)?, progress)?;
         let (label, count) = surface.mesh.components();
-        Ok(Self { components: Groups::by_label(&label, count, FaceId::new), surface })
+        let painted =
+            input.seam_weights.map(|weights| surface.vertex.iter().map(|&v| weights[v as usize]).collect());
+        Ok(Self { components: Groups::by_label(&label, count, FaceId::new), painted, surface })
     }
 
     /// The stages after conditioning. Of `input` only positions, corners and offsets are looked at.
@@ -49,8 +54,12 @@ impl Prepared {
         let positions: Vec<Point3<f64>> =
             vertex.iter().map(|&v| input.positions[v as usize].map(|x| x / scale).into()).collect();
         let visibility = self.visibility(&positions, settings, run)?;
-        let visibility = visibility.as_deref().map(Vec::as_slice);
-        let (charts, rungs) = cutting::cut(&self.surface, &self.components, &positions, visibility, settings, run)?;
+        let vertices = AtVertices {
+            positions: &positions,
+            visibility: visibility.as_deref().map(Vec::as_slice),
+            painted: self.painted.as_deref(),
+        };
+        let (charts, rungs) = cutting::cut(&self.surface, &self.components, &vertices, settings, run)?;
         clock.lap("charts");
         layout::lay_out(input, &self.surface, charts, rungs, settings, clock, run)
     }

@@ -325,6 +325,7 @@ def unwrap(
     corner_triangles: Buffer | None = None,
     seams: Buffer | None = None,
     guides: Buffer | None = None,
+    seam_weights: Buffer | None = None,
     job: Job | None = None,
     **settings: Unpack[_UnwrapSettings],
 ) -> Atlas: ...
@@ -336,6 +337,7 @@ def submit_unwrap(
     corner_triangles: Buffer | None = None,
     seams: Buffer | None = None,
     guides: Buffer | None = None,
+    seam_weights: Buffer | None = None,
     job: Job | None = None,
     **settings: Unpack[_UnwrapSettings],
 ) -> Job: ...
@@ -347,6 +349,7 @@ def analyse(
     corner_triangles: Buffer | None = None,
     seams: Buffer | None = None,
     guides: Buffer | None = None,
+    seam_weights: Buffer | None = None,
     job: Job | None = None,
     **settings: Unpack[_AnalyseSettings],
 ) -> Analysis: ...

@@ -1,0 +1,45 @@
+"""Where an artist has painted that seams are to keep away from, or are welcome."""
+
+import bmesh
+import numpy as np
+
+from .mesh_arrays import read_array
+
+FULL_WEIGHT = 10.0  # at full weight a seam counts for so many times its length, or for that share of it
+
+
+def seam_weights(obj, away, here):
+    """What a seam at each vertex of a mesh object counts for, (n,) float32, and those of the two names that it has.
+
+    `away` and `here` name a vertex group, or an attribute of one number a point, whose values from 0 to 1 say where seams
+    are to keep away, and where they are welcome; without a name, or where the object has neither, nowhere. Of a mesh in
+    edit mode, which has been brought up to date.
+    """
+    exponents, found = np.zeros(len(obj.data.vertices), np.float32), set()
+    for name, sign in ((away, 1.0), (here, -1.0)):
+        values = _values(obj, name) if name else None
+        if values is not None:
+            found.add(name)
+            exponents += sign * np.clip(np.nan_to_num(values), 0.0, 1.0)
+    return np.float32(FULL_WEIGHT) ** exponents, found
+
+
+def _values(obj, name):
+    """The values of a vertex group or an attribute at each vertex; None where there is none of that name."""
+    mesh = obj.data
+    group = obj.vertex_groups.get(name)
+    if group is not None:
+        values = np.zeros(len(mesh.vertices), np.float32)
+        for vertex in mesh.vertices:
+            for element in vertex.groups:
+                if element.group == group.index:
+                    values[vertex.index] = element.weight
+        return values
+    if mesh.is_editmode:
+        vertices = bmesh.from_edit_mesh(mesh).verts
+        layer = vertices.layers.float.get(name)
+        return None if layer is None else np.fromiter((v[layer] for v in vertices), np.float32, len(vertices))
+    attribute = mesh.attributes.get(name)
+    if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "FLOAT"):
+        return None
+    return read_array(attribute.data, "value", np.float32)
