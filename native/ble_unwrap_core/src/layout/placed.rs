@@ -5,7 +5,7 @@ use nalgebra::Point2;
 use crate::charts::Chart;
 use crate::error::UnwrapError;
 use crate::mesh::{FaceId, MeshInput, Surface, VertexId};
-use crate::packing::{self, PackItem, PackSettings, Packed};
+use crate::packing::{self, PackItem, PackSettings, Packed, Shortfall};
 use crate::progress::Progress;
 use crate::rounding::{self, Rounding, RoundingError};
 
@@ -19,6 +19,8 @@ pub(super) struct Placed {
     /// Faces (of the surface) that rounding turned over, with their chart.
     pub(super) broken: Vec<(usize, FaceId)>,
     pub(super) specks: usize,
+    pub(super) texels_per_unit: f64,
+    pub(super) shortfall: Option<Shortfall>,
 }
 
 impl Placed {
@@ -31,21 +33,20 @@ impl Placed {
     ) -> Result<Self, UnwrapError> {
         let packed = pack(charts, packing, progress)?;
         let size = packed.size.map(f64::from);
-        let rounding = Rounding { texel: size.map(|s| 1.0 / s), diagonal: surface.diagonal };
         let mut layout = Self {
             uv: vec![[0.0; 2]; input.corner_vertices.len()],
             face_chart: vec![-1; surface.mesh.face_count()],
             polygon_chart: vec![-1; input.face_offsets.len().saturating_sub(1)],
             broken: Vec::new(),
             specks: packed.specks,
+            texels_per_unit: packed.texels_per_unit,
+            shortfall: packed.shortfall,
         };
-        for (number, (chart, pose)) in charts.iter().zip(&packed.poses).enumerate() {
+        for (number, (chart, tile)) in charts.iter().zip(&packed.tiles).enumerate() {
             progress.check()?;
-            let place = |p: &Point2<f64>| {
-                let texel = pose.texel(*p);
-                Point2::new(texel.x / size[0], texel.y / size[1])
-            };
-            let exact: Vec<Point2<f64>> = chart.uv.iter().map(place).collect();
+            let exact: Vec<Point2<f64>> = chart.uv.iter().map(|p| packed.uv(number, *p)).collect();
+            let texel = size.map(|s| 1.0 / s);
+            let rounding = Rounding { texel, corner: tile.corner(), diagonal: surface.diagonal };
             let halves = quads::convex_halves(chart);
             let uv = match rounding::round_to_f32(&chart.patch.mesh, &halves, &exact, &rounding, progress) {
                 Ok(rounded) => rounded.uv,
