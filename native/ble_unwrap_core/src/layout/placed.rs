@@ -31,7 +31,7 @@ impl Placed {
         packing: &PackSettings,
         progress: &Progress,
     ) -> Result<Self, UnwrapError> {
-        let packed = pack(charts, packing, progress)?;
+        let packed = pack(charts, surface.scale, packing, progress)?;
         let size = packed.size.map(f64::from);
         let mut layout = Self {
             uv: vec![[0.0; 2]; input.corner_vertices.len()],
@@ -76,11 +76,18 @@ impl Placed {
     }
 }
 
-fn pack(charts: &[Chart], packing: &PackSettings, progress: &Progress) -> Result<Packed, UnwrapError> {
+/// Packs charts whose unit is `unit` units of the input, in which densities are given and told.
+fn pack(charts: &[Chart], unit: f64, packing: &PackSettings, progress: &Progress) -> Result<Packed, UnwrapError> {
     let index = |v: VertexId| u32::try_from(v.index()).unwrap_or(u32::MAX);
     let triangles: Vec<Vec<[u32; 3]>> =
         charts.iter().map(|c| c.patch.mesh.triangles().iter().map(|t| t.map(index)).collect()).collect();
     let items: Vec<PackItem<'_>> =
         charts.iter().zip(&triangles).map(|(c, t)| PackItem { points: &c.uv, triangles: t }).collect();
-    Ok(packing::pack(&items, packing, progress)?)
+    // A surface has unit area, so that what is out of range here fits into no texture, or is specks in any.
+    let in_unit = |density: f64| (density * unit).clamp(f64::MIN_POSITIVE, PackSettings::GREATEST_DENSITY);
+    let scaled = PackSettings { texel_density: packing.texel_density.map(in_unit), ..packing.clone() };
+    let packed = packing::pack(&items, &scaled, progress)?;
+    let told =
+        |s: Shortfall| Shortfall { wanted: packing.texel_density.unwrap_or(s.wanted), reached: s.reached / unit, ..s };
+    Ok(Packed { texels_per_unit: packed.texels_per_unit / unit, shortfall: packed.shortfall.map(told), ..packed })
 }

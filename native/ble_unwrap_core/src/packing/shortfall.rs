@@ -24,9 +24,9 @@ impl fmt::Display for Shortfall {
         write!(f, "a texel density of {wanted} does not fit into {within}; ")?;
         write!(f, "{reached:.4} texels to a unit of length is the most that was found: ")?;
         match needed {
-            None => {
-                f.write_str("the largest chart takes a whole tile then, so choose a larger texture or a lower density")
-            }
+            None => f.write_str(
+                "one chart is larger than a tile at that density, so choose a larger texture or a lower density",
+            ),
             Some(needed) if needed <= Tile::MOST => {
                 write!(f, "allow {needed} tiles or more, or choose a larger texture or a lower density")
             }
@@ -51,6 +51,6 @@ mod tests {
                 && text(1, Some(4)).contains("allow 4 tiles or more")
         );
         assert!(text(4, Some(5000)).contains("into 4 tiles") && text(4, Some(5000)).contains("at most 100"));
-        assert!(text(4, None).contains("the largest chart") && !text(4, None).contains("allow"));
+        assert!(text(4, None).contains("larger than a tile") && !text(4, None).contains("allow"));
     }
 }
