@@ -8,12 +8,12 @@ use super::many::{self, ROWS_ONLY, ROWS_TRIED};
 use super::mask::Reach;
 use super::obstacles::Obstacles;
 use super::outline::Outline;
-use super::placement::Dense;
+use super::placement::{Dense, Place};
 use super::pose::base_turns;
 use super::refine::Refinement;
 use super::search::Search;
 use super::shape::SAFETY_TEXELS;
-use super::sketch::{Sketch, growth, most_promising};
+use super::sketch::{Sketch, Spot, growth, most_promising};
 use super::{Constraints, PackError, PackSettings, Quality, Rotation};
 use crate::progress::{Cancelled, Progress};
 
@@ -249,6 +249,35 @@ pub(super) fn densest_up_to(
         None => fine.once((0.5 / largest).min(most))?,
     };
     best.map(|best| (best.dense(grid), trials)).ok_or(no_room)
+}
+
+/// A placement of outlines at a lower density, the given scale, with every chart near where it was; `None` where that does not fit so. It costs
+/// no search, and is expected to fit, since smaller charts need less room.
+///
+/// # Errors
+/// [`PackError::Cancelled`].
+pub(super) fn thinned(
+    outlines: &[Outline],
+    places: &[Option<Place>],
+    constraints: &Constraints<'_>,
+    settings: &PackSettings,
+    progress: &Progress,
+) -> Result<Option<Dense>, PackError> {
+    let Some(ceiling) = constraints.scale else { return Ok(None) };
+    let grid = Grid::new(settings, constraints.border(settings), outlines.len());
+    let reach = Reach::new(settings.margin_texels / grid.cell);
+    let obstacles = Obstacles::new(constraints.obstacles, grid, SAFETY_TEXELS / grid.cell, &reach, progress)?;
+    let spot = |place: &Place| {
+        let (turn, centre) = grid.texture_to_frame(place.pose);
+        Spot { turn, centre }
+    };
+    let spots = places.iter().map(|place| place.as_ref().map(spot)).collect();
+    let sketch = Sketch { spots, density: ceiling, cell: grid.cell };
+    let obstacles = obstacles.as_ref();
+    let reach = &reach;
+    let mut refinement =
+        Refinement { outlines, grid, reach, obstacles, ceiling, stops_early: true, placements: 0, progress };
+    Ok(refinement.best_of(&[sketch])?.filter(|dense| dense.density >= ceiling))
 }
 
 /// Base angles to try, by chart; `areas` tell which are large.

@@ -13,6 +13,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use super::density::{self, SAME_SCALE};
+use super::many::ROWS_ONLY;
 use super::obstacles;
 use super::outline::Outline;
 use super::placement::{Dense, Place};
@@ -30,6 +31,8 @@ const EXPECTED_FILL: f64 = 0.75;
 const MOVES: [usize; 3] = [6, 12, 24];
 /// Moves in a row that did not help, after which no more are tried.
 const PATIENCE: usize = 2;
+/// From so many charts in a tile on, what a move gains is less than what the two packings of hundreds of charts are worth.
+const MANY: usize = 100;
 /// Where the least dense tile is packed at this share of the density wanted or less, a few moves do not help.
 const HOPELESS: f64 = 0.93;
 /// Densities of two tiles that differ by less than this share are about what packing the same charts anew may change.
@@ -347,11 +350,7 @@ impl<'a> Packer<'a> {
         if charts.is_empty() {
             return Ok(Load { tile, charts, places: Vec::new(), density: f64::INFINITY });
         }
-        let outline = |&i: &usize| {
-            self.progress.check()?;
-            Ok(self.outlines[i].clone())
-        };
-        let outlines: Vec<Outline> = charts.par_iter().map(outline).collect::<Result<_, Cancelled>>()?;
+        let outlines = self.outlines_of(&charts)?;
         let obstacles = obstacles::in_tile(self.constraints.obstacles, tile, self.settings);
         let constraints = Constraints { border_texels: Some(self.border), scale: ceiling, obstacles: &obstacles };
         let found = density::densest_up_to(&outlines, &constraints, &self.inner, self.progress);
@@ -371,6 +370,30 @@ impl<'a> Packer<'a> {
             }
             Err(error) => Err(error),
         }
+    }
+
+    fn outlines_of(&self, charts: &[usize]) -> Result<Vec<Outline>, Cancelled> {
+        let outline = |&i: &usize| {
+            self.progress.check()?;
+            Ok(self.outlines[i].clone())
+        };
+        charts.par_iter().map(outline).collect()
+    }
+
+    /// The charts of a tile at a lower density: where they are, if that is possible, else packed anew.
+    fn thinned(&self, load: &Load, density: f64) -> Result<Load, PackError> {
+        // One chart is fitted without a search, and boxes in rows are as fast.
+        if (2..ROWS_ONLY).contains(&load.charts.len()) {
+            let obstacles = obstacles::in_tile(self.constraints.obstacles, load.tile, self.settings);
+            let constraints =
+                Constraints { border_texels: Some(self.border), scale: Some(density), obstacles: &obstacles };
+            let outlines = self.outlines_of(&load.charts)?;
+            let thinned = density::thinned(&outlines, &load.places, &constraints, &self.inner, self.progress)?;
+            if let Some(Dense { places, density }) = thinned {
+                return Ok(Load { tile: load.tile, charts: load.charts.clone(), places, density });
+            }
+        }
+        self.packed(load.tile, load.charts.clone(), Some(density))
     }
 
     /// Moves charts from the tile that is packed the least densely to the one that is so the most, where that makes the former denser than both were.
@@ -393,7 +416,8 @@ impl<'a> Packer<'a> {
             let density = found.loads[tight].density;
             let is_reached = ceiling.is_some_and(|ceiling| density >= ceiling * (1.0 - SAME_SCALE));
             let is_hopeless = !is_last && ceiling.is_some_and(|ceiling| density < HOPELESS * ceiling);
-            if idle >= PATIENCE || found.loads[tight].charts.len() < 2 || is_reached || is_hopeless {
+            let is_movable = (2..MANY).contains(&found.loads[tight].charts.len());
+            if idle >= PATIENCE || !is_movable || is_reached || is_hopeless {
                 break;
             }
             let weight = |load: &Load| load.charts.iter().map(|&i| weights[i]).sum::<f64>();
@@ -456,7 +480,7 @@ impl<'a> Packer<'a> {
                     if is_at_common(load) {
                         return Ok(load.clone());
                     }
-                    self.packed(load.tile, load.charts.clone(), Some(common))
+                    self.thinned(load, common)
                 })
                 .collect();
             let loads: Vec<Load> = packed.into_iter().collect::<Result<_, PackError>>()?;
