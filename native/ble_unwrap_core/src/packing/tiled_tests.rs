@@ -27,8 +27,11 @@ fn at_density(settings: &PackSettings, density: f64) -> PackSettings {
     PackSettings { texel_density: Some(density), ..settings.clone() }
 }
 
+/// Triangles of a chart, in texels from the corner of its tile.
+type Placed = Vec<[Point2<f64>; 3]>;
+
 /// The charts of each tile with their placement there, as it comes out after rounding where that tile lies.
-fn by_tile(charts: &[Chart], packed: &Packed) -> Vec<(Tile, Vec<Vec<[Point2<f64>; 3]>>)> {
+fn by_tile(charts: &[Chart], packed: &Packed) -> Vec<(Tile, Vec<Placed>)> {
     let size = packed.size.map(f64::from);
     let tiles: BTreeSet<Tile> = packed.tiles.iter().copied().collect();
     tiles
