@@ -17,7 +17,8 @@ class CloudTask:
         self.cloud = cloud
         self.settings = {**properties.default_values(settings.get("preset", "DEFAULT")), **settings}
         self.native = properties.native_values(settings, properties.SURFACE_SETTINGS)
-        self.native |= {name: self.settings[name] for name in properties.KEPT_BY_PRESETS}
+        kept = [name for name in properties.KEPT_BY_PRESETS if name not in properties.SURFACE_SETTINGS]
+        self.native |= {name: self.settings[name] for name in kept}
         self.native["threads"] = threads
         self.bounds = None
         if self.settings["use_original_bounds"]:

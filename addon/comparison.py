@@ -75,6 +75,9 @@ def compare(objects, settings, *, angles=ANGLES, threads=0, progress=None):
         "use_selection": False,
         "uv_map": "ACTIVE",
         "use_original_bounds": False,
+        # Smart UV Project fills one texture.
+        "tiles": 1,
+        "texel_density": 0.0,
     }
     objects = mesh_bridge.unique_meshes(objects)
     if settings["correct_aspect"]:

@@ -5,12 +5,13 @@ import numpy as np
 from . import engine
 
 
-def measure(selection, uv, *, texture_size, margin, weld=True, weld_distance=0.0):
+def measure(selection, uv, *, texture_size, margin, tiles=1, weld=True, weld_distance=0.0):
     """Measures any UVs of a selection, whoever made them; the keys of the native report.
 
     With `weld`, charts run across vertices at one place as in `unwrap`: files often split vertices at every face.
     """
-    settings = {"texture_size": texture_size, "margin": float(margin), "weld": weld, "weld_distance": weld_distance}
+    settings = {"texture_size": texture_size, "margin": float(margin), "tiles": tiles}
+    settings |= {"weld": weld, "weld_distance": weld_distance}
     return dict(
         engine.call(
             lambda module: module.measure(

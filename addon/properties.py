@@ -13,7 +13,7 @@ from . import settings_table
 
 # What an artist wants of the result whatever the method: presets leave these alone, and the native module, whose
 # presets have values of their own for them, always gets them.
-KEPT_BY_PRESETS = ("stretch_limit", "texture_size", "margin")
+KEPT_BY_PRESETS = ("stretch_limit", "texture_size", "margin", "tiles", "texel_density")
 # Preset -> what it differs in from the defaults; shown in the panel when the preset is chosen.
 PRESET_VALUES = {preset: settings_table.differences(preset, KEPT_BY_PRESETS) for preset in settings_table.PRESETS}
 
@@ -51,7 +51,10 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
 
     preset: EnumProperty(
         name="Preset",
-        description="How it is done: values of all settings but stretch limit, texture size, margin and the result's",
+        description=(
+            "How it is done: values of all settings but stretch limit, texture size, margin, tiles, texel density and "
+            "the result's"
+        ),
         items=settings_table.preset_items(),
         default="DEFAULT",
         update=_apply_preset,
@@ -64,6 +67,9 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     margin: declared("margin", soft_max=32.0, step=50, precision=1, subtype="PIXEL")
     rotation: declared("rotation")
     quality: declared("quality")
+    tiles: declared("tiles", soft_max=20)
+    # Lengths are those of the scene, in its units: objects are unwrapped at the scale that they have there.
+    texel_density: declared("texel_density", soft_max=8192.0, step=1000, precision=3)
     use_seams: BoolProperty(
         name="Cut at Seams",
         description=(
@@ -253,7 +259,7 @@ ADVANCED_SETTINGS = (
     ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max", "together_max")),
     ("Embedding", ("model", "kernel_width", "relaxation", "max_sweeps", "tolerance", "update", "initial")),
     ("Stretch", ("stretch_solver", "stretch_iterations")),
-    ("Packing", ("quality",)),
+    ("Packing", ("quality", "tiles", "texel_density")),
 )
 
 

@@ -51,6 +51,15 @@ def summary(measured, seconds=None):
     return ", ".join(parts)
 
 
+def _used_text(measured):
+    """How much of the texture, or of its tiles, is used, and at which texel density."""
+    tiles = int(measured.get("tiles") or 1)
+    of = "the texture" if tiles == 1 else f"{tiles} tiles"
+    text = f"{100 * float(measured.get('packing_efficiency') or 0):.1f}% of {of} used"
+    density = measured.get("texels_per_unit")
+    return f"{text}, {density:.4g} px per unit of length" if density else text
+
+
 def _overlaps_text(measured):
     """The overlaps, also with faces that were not unwrapped: of these there is no promise, so they are always told."""
     overlaps, kept = counted(measured.get("overlaps"), "overlap"), measured.get("overlaps_with_kept")
@@ -94,7 +103,7 @@ def lines(certificate, *, margin, stretch_limit, limit_over="CHART", notes=(), l
         result.append(("OK" if gap_ok else "BAD", f"Charts {least}{gap:.1f} px apart (margin {margin:g} px)"))
     if unmapped:
         result.append(("BAD", f"{counted(unmapped, 'face')} without UVs"))
-    result.append(("INFO", f"{100 * float(measured.get('packing_efficiency') or 0):.1f}% of the texture used"))
+    result.append(("INFO", _used_text(measured)))
     if measured.get("seam_length_absolute") is not None:
         result.append(("INFO", f"Seams {length_text(float(measured['seam_length_absolute']))} long"))
     return result + [("INFO", text) for text in notes] + [("WARN", text) for text in certificate.warnings]

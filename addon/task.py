@@ -93,6 +93,10 @@ class UnwrapTask:
             self.selection.warnings.append(why_not)
         else:
             self.native["texture_size"] = self.bounds.pixels
+            if self.native["tiles"] > 1:
+                # A part of one tile has no tiles of its own.
+                self.settings["tiles"] = self.native["tiles"] = 1
+                self.selection.warnings.append("With Keep Place there is only one tile")
 
     @property
     def title(self):
@@ -137,9 +141,10 @@ class UnwrapTask:
         measured = result.report
         warnings = [*self.selection.warnings, *result.report.get("warnings", ())]
         if measure_again:
-            given = {name: self.settings[name] for name in ("texture_size", "margin", "weld", "weld_distance")}
+            given = {name: self.settings[name] for name in ("texture_size", "margin", "tiles", "weld", "weld_distance")}
             try:
                 measured = measurement.measure(self.selection, held, **given)
+                measured["texels_per_unit"] = result.report["texels_per_unit"]
             except engine.EngineError as error:  # the UVs are written: say what is known
                 warnings.append(f"The written UVs could not be measured: {error}")
         if kept := mesh_bridge.kept_faces(self.selection, whole):

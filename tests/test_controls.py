@@ -272,3 +272,62 @@ def test_a_cancelled_call_leaves_the_analysis_good(large_ball):
     job.cancel()
     with pytest.raises(native.Cancelled):
         native.analyse(*large_ball, job=job)
+
+
+# Tiles and texel density ----------------------------------------------------------------------------------------------
+
+
+def tiles_of(result, offsets):
+    """The tile of each chart, whose faces must all lie in the same one."""
+    uv, chart = arrays(result)
+    number = np.floor(uv).astype(int) @ [1, 10]
+    owner = np.repeat(chart, np.diff(offsets))
+    found = {c: set(number[owner == c].tolist()) for c in np.unique(chart)}
+    assert all(len(tiles) == 1 for tiles in found.values()), found
+    return {c: tiles.pop() for c, tiles in found.items()}
+
+
+def cube():
+    """A cube of side 1, whose corners are its vertices."""
+    positions = np.array([[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)])
+    quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    return positions, np.array(quads, np.int32).ravel(), np.arange(0, 25, 4, dtype=np.int32)
+
+
+def test_an_atlas_in_four_tiles_is_proven_on_any_number_of_threads(blob):
+    options = {"tiles": 4, "texture_size": 256, "stretch_limit": 1.02}
+    results = [native.unwrap(*blob, threads=threads, **options) for threads in (1, 2)]
+    (uv, chart), (again, _) = map(arrays, results)
+    assert_array_equal(uv.view(np.uint32), again.view(np.uint32))
+    report, certificate = results[0].report, results[0].certificate
+    assert certificate["valid"] and certificate["out_of_range"] == 0 and certificate["gap_texels"] >= 4
+    tiles = tiles_of(results[0], blob[2])
+    assert report["tiles"] == len(set(tiles.values())) == min(4, report["charts"]) and report["charts"] > 1
+    measured = native.measure(*blob, uv, chart=chart, texture_size=256, tiles=4)
+    assert measured["tiles"] == report["tiles"]
+    assert measured["packing_efficiency"] == pytest.approx(report["packing_efficiency"])
+    single = native.unwrap(*blob, **(options | {"tiles": 1})).report
+    assert report["texels_per_unit"] > 1.1 * single["texels_per_unit"]
+    # What lies in tiles that the texture has not is out of range.
+    assert native.measure(*blob, uv, chart=chart, texture_size=256)["tiles"] == 0
+
+
+@pytest.mark.parametrize(("size", "most"), [(4096, 1), (1024, 6), (600, 6)])
+def test_a_cube_gets_the_texel_density_asked_for(size, most):
+    mesh = cube()
+    seams = np.array([[a, b] for a in range(8) for b in range(a) if bin(a ^ b).count("1") == 1], np.int32)
+    result = native.unwrap(*mesh, seams=seams, texel_density=512, tiles=20, texture_size=size)
+    uv, _ = arrays(result)
+    assert result.certificate["valid"] and result.report["warnings"] == []
+    sides = uv.astype(float).reshape(6, 4, 2) * size
+    lengths = np.linalg.norm(sides - np.roll(sides, 1, axis=1), axis=-1)
+    np.testing.assert_allclose(lengths, 512, rtol=1e-4)
+    assert result.report["texels_per_unit"] == pytest.approx(512, rel=1e-6)
+    assert result.report["tiles"] == len(set(tiles_of(result, mesh[2]).values())) == most
+
+
+def test_a_texel_density_that_does_not_fit_warns(blob):
+    result = native.unwrap(*blob, texel_density=5000, tiles=2, texture_size=128)
+    (warning,) = [text for text in result.report["warnings"] if "texel density" in text]
+    assert "5000 does not fit into 2 tiles" in warning
+    assert result.certificate["valid"] and result.report["texels_per_unit"] < 5000

@@ -291,6 +291,107 @@ def test_shapes_that_are_hard_to_pack():
             check(uv, triangles, chart, (128, 128), 1.0)
 
 
+def tile_of(uv, triangles, chart):
+    """The tile of each chart by the middle of its box, as (column, row)."""
+    boxes = [(own.min(0), own.max(0)) for own in (uv[np.unique(triangles[chart == c])] for c in np.unique(chart))]
+    return np.floor([(low + high) / 2 for low, high in boxes]).astype(int)
+
+
+def check_tiles(packed, triangles, chart, size, margin, tiles):
+    """Asserts that charts keep their promises in every tile, and that the report counts these."""
+    uv = np.asarray(packed.uv).astype(float)
+    tile = tile_of(uv, triangles, chart)
+    number = tile @ [1, 10]
+    assert number.min() >= 0 and number.max() < tiles and (tile[:, 0] < 10).all()
+    for k in np.unique(number):
+        here = number[chart] == k
+        check(uv - tile[number == k][0], triangles[here], chart[here], size, margin)
+    assert packed.report["tiles"] == len(np.unique(number))
+    return number
+
+
+def mixed(count, seed):
+    rng = np.random.default_rng(seed)
+    return joined([ngon(3 + k % 5, 0.3 + rng.random(), turn=k) * [1 + rng.random(), 1] for k in range(count)])
+
+
+def test_charts_are_spread_over_tiles_on_any_number_of_threads():
+    points, triangles, chart = mixed(40, 3)
+    options = {"texture_size": (256, 200), "margin": 2.5, "tiles": 4}
+    one, two = (native.pack(points, triangles, chart, threads=threads, **options) for threads in (1, 2))
+    assert_array_equal(np.asarray(one.uv).view(np.uint32), np.asarray(two.uv).view(np.uint32))
+    assert one.report == two.report and one.report["warnings"] == []
+    check_tiles(one, triangles, chart, (256, 200), 2.5, 4)
+    single = native.pack(points, triangles, chart, **(options | {"tiles": 1})).report
+    assert one.report["tiles"] == 4 and single["tiles"] == 1
+    assert one.report["texels_per_unit"] > 1.9 * single["texels_per_unit"]
+    # The share that is covered is that of the tiles, by the very areas.
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    covered = 0.5 * np.abs(cross(a, b, c)).sum() * one.report["texels_per_unit"] ** 2 / (4 * 256 * 200)
+    assert one.report["packing_efficiency"] == pytest.approx(covered, rel=1e-3)
+
+
+@given(
+    polygons=POLYGONS,
+    tiles=st.integers(1, 25),
+    density=st.sampled_from([None, 50.0, 400.0, 3000.0]),
+    margin=st.sampled_from([0.0, 2.5, 6.0]),
+    size=st.sampled_from([(128, 128), (90, 160)]),
+)
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_margins_hold_in_any_number_of_tiles(polygons, tiles, density, margin, size):
+    points, triangles, chart = joined([ngon(*polygon) for polygon in polygons])
+    options = {"texture_size": size, "margin": margin, "tiles": tiles, "texel_density": density}
+    packed = native.pack(points, triangles, chart, **options)
+    check_tiles(packed, triangles, chart, size, margin, tiles)
+    reached = packed.report["texels_per_unit"]
+    if density is not None:
+        assert reached == pytest.approx(density, rel=1e-9) or (reached < density and packed.report["warnings"])
+
+
+def test_a_texel_density_is_exact_in_as_few_tiles_as_needed():
+    # The faces of a cube of side 1 with 512 texels to each side: four have room in 2 * 512 + 4 texels between two
+    # borders of 2, and a little for rounding.
+    points, triangles, chart = joined([UNIT] * 6)
+    for size, tiles in ((2048, 1), (1040, 2), (1024, 6), (600, 6)):
+        packed = native.pack(points, triangles, chart, texture_size=size, margin=4, tiles=50, texel_density=512)
+        assert packed.report["tiles"] == tiles, size
+        check_tiles(packed, triangles, chart, (size, size), 4.0, 50)
+        sides = np.linalg.norm(np.diff(np.asarray(packed.uv).astype(float).reshape(6, 4, 2), axis=1), axis=-1) * size
+        assert_allclose(sides, 512, rtol=1e-4)
+        assert packed.report["texels_per_unit"] == pytest.approx(512, rel=1e-9) and not packed.report["warnings"]
+
+
+def test_a_texel_density_that_does_not_fit_warns_and_is_as_dense_as_can_be():
+    points, triangles, chart = joined([ngon(3 + k % 5, 1 + 0.2 * (k % 3), turn=k) for k in range(30)])
+    options = {"texture_size": 128, "margin": 1}
+    most = native.pack(points, triangles, chart, tiles=3, **options).report["texels_per_unit"]
+    packed = native.pack(points, triangles, chart, tiles=3, texel_density=2 * most, **options)
+    check_tiles(packed, triangles, chart, (128, 128), 1.0, 3)
+    assert 0.95 * most < packed.report["texels_per_unit"] < 1.05 * most
+    (warning,) = packed.report["warnings"]
+    assert "does not fit into 3 tiles" in warning and "tiles or more" in warning
+    (warning,) = native.pack(UNIT, TWO, np.zeros(2, int), tiles=3, texel_density=1000, **options).report["warnings"]
+    assert "one chart is larger than a tile" in warning
+
+
+def test_groups_obstacles_and_a_fixed_size_in_tiles():
+    points, triangles, chart = joined([UNIT * 0.9 + [1.05, 0.05], *[0.4 * UNIT] * 6])
+    obstacles = chart == 0
+    groups = np.where(chart == 1, 7, np.where(chart == 2, 7, -1)).astype(np.int32)
+    options = {"texture_size": 128, "margin": 2, "tiles": 4, "obstacles": obstacles, "groups": groups}
+    packed = native.pack(points, triangles, chart, scale="fixed", **options)
+    uv = np.asarray(packed.uv)
+    assert_array_equal(uv[:4], points[:4].astype(np.float32))
+    assert_array_equal(uv[4:8], uv[8:12])
+    number = tile_of(uv.astype(float), triangles, chart) @ [1, 10]
+    # The second tile has no room beside the obstacle; four squares have room in another, and five are to be placed.
+    assert number[0] == 1 and set(number[1:]) == {0, 2}
+    assert packed.report["texels_per_unit"] == pytest.approx(128)
+    with pytest.raises(native.InvalidArgumentError, match="cannot be given a texel density of 9"):
+        native.pack(points, triangles, chart, scale="fixed", texel_density=9, **options)
+
+
 def squares(count, seed=0):
     rng = np.random.default_rng(seed)
     points = (UNIT * np.exp(rng.normal(size=(count, 1, 1)))).reshape(-1, 2)
@@ -337,8 +438,9 @@ def test_obstacles_are_kept_by_thousands_of_charts():
     assert distance(texels[all_triangles[:4]], texels[all_triangles[4:]]) >= 3
 
 
+@pytest.mark.parametrize("tiles", [{}, {"tiles": 12}, {"tiles": 30, "texel_density": 500.0}])
 @pytest.mark.parametrize("count", [2000, 60_000])
-def test_cancelling_is_seen_soon(count):
+def test_cancelling_is_seen_soon(count, tiles):
     points, triangles, chart = squares(count)
     job = native.Job()
     times = []
@@ -351,7 +453,7 @@ def test_cancelling_is_seen_soon(count):
     thread = threading.Thread(target=cancel)
     thread.start()
     with contextlib.suppress(native.Cancelled):  # packing may also have ended before
-        native.pack(points, triangles, chart, texture_size=4096, quality="high", job=job)
+        native.pack(points, triangles, chart, texture_size=4096, quality="high", job=job, **tiles)
     ended = time.perf_counter()
     thread.join()
     # Much of a second, not a tenth: the machine may be busy with other tests.

@@ -218,5 +218,10 @@ def test_tooltips_end_without_a_full_stop_and_say_what_0_stands_for(settings_tab
     row = ROWS["landmark_max"]
     assert settings_table.tooltip(row) == row["sentence"] + " 0 stands for no limit"
     assert settings_table.tooltip(ROWS["seed"]) + "." == ROWS["seed"]["sentence"]
-    assert set(settings_table.ZERO_STANDS_FOR_NONE) == {"landmark_max", "kernel_width", "weld_distance"}
+    assert set(settings_table.ZERO_STANDS_FOR_NONE) == {
+        "landmark_max",
+        "kernel_width",
+        "weld_distance",
+        "texel_density",
+    }
     assert "limit_over" in settings_table.taken_by("unwrap") - settings_table.taken_by("unwrap_points")

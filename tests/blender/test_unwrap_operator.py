@@ -173,6 +173,41 @@ def test_selection_keeps_its_place_in_the_texture():
     assert (uv.max(axis=0) <= values.max(axis=0) + 1e-6).all()
 
 
+def test_a_texel_density_counts_in_lengths_of_the_scene_over_tiles():
+    obj = cube()
+    obj.scale = (2, 2, 2)
+    for edge in obj.data.edges:
+        edge.use_seam = True
+    bpy.context.view_layer.update()
+    pixels = 512
+    assert unwrap(tiles=20, texel_density=60.0, texture_size=(pixels, pixels)) == {"FINISHED"}
+    uv = uvs(obj)
+    density = np.sqrt(triangle_areas(obj, uv) * pixels**2 / (surface_areas(obj) * 4))
+    np.testing.assert_allclose(density, 60, rtol=1e-3)
+    # Four squares of 240 pixels have room in a tile.
+    assert len(np.unique(np.floor(uv).astype(int), axis=0)) == 2
+    assert all(status in {"OK", "INFO"} for status, _ in certificate())
+    (line,) = [text for _, text in certificate() if " used" in text]
+    assert "2 tiles used, 60 px per unit of length" in line
+
+
+def test_a_texel_density_that_does_not_fit_is_a_warning():
+    cube()
+    assert unwrap(tiles=2, texel_density=9000.0, texture_size=(256, 256)) == {"FINISHED"}
+    assert any(status == "WARN" and "does not fit into 2 tiles" in text for status, text in certificate())
+
+
+def test_a_place_that_is_kept_has_no_tiles():
+    obj = grid(4)
+    obj.data.uv_layers.new(name="UVMap")
+    set_uvs(obj, uvs(obj) * np.float32(0.25) + np.float32((0.5, 0.125)))
+    edit(obj)
+    assert unwrap(use_original_bounds=True, tiles=4, texture_size=(1024, 1024)) == {"FINISHED"}
+    assert any("there is only one tile" in text for _, text in certificate())
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert uvs(obj).max() <= 1
+
+
 def test_nothing_selected_is_an_error():
     obj = grid()
     edit(obj, faces=[])

@@ -12,7 +12,7 @@ use crate::verify::Certificate;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Atlas {
-    /// One UV for each corner, in [0, 1]²; (0, 0) for the corners of faces that are not mapped, because a vertex is not
+    /// One UV for each corner, in [0, 1]² or, with several [tiles](crate::settings::PackSettings::tiles), in one of these; (0, 0) for the corners of faces that are not mapped, because a vertex is not
     /// finite.
     pub uv: Vec<[f32; 2]>,
     /// The chart of each input face, numbered from 0; −1 for faces that are not mapped.

@@ -38,8 +38,13 @@ pub struct Report {
     pub seam_length: f64,
     /// Length of the seams in the unit of the mesh.
     pub seam_length_absolute: f64,
-    /// Share of the unit square that charts cover.
+    /// Share of the tiles in which there are charts that charts cover: of the unit square, if there is only one.
     pub packing_efficiency: f64,
+    /// Number of tiles of the texture in which there are charts.
+    pub tiles: usize,
+    /// The texel density that charts have: texels to a unit of length of the mesh, where a chart is not stretched. Charts that were enlarged have more, and
+    /// with [`ChartScale::Stretch`](crate::settings::ChartScale::Stretch) each has this times its own factor.
+    pub texels_per_unit: f64,
     /// Least distance between two charts in texels. A distance above eight texels and above twice the margin is given as
     /// the larger of these two values.
     pub gap_texels: f64,
@@ -89,6 +94,7 @@ impl Report {
             seam_length: measures.seam_length,
             seam_length_absolute: measures.seam_length_absolute,
             packing_efficiency: measures.packing_efficiency,
+            tiles: measures.tiles,
             gap_texels: measures.gap_texels,
             chart_limit: limit,
             charts_over_limit: over,

@@ -28,6 +28,8 @@ use crate::unwrap::{MeshArrays, Wishes};
 ///     As for ``unwrap``: which vertices count as one. Without ``weld`` an edge between two vertices of the mesh is no seam.
 /// texture_size : int or two ints
 ///     Width and height of the texture in texels.
+/// tiles : int
+///     Number of tiles, each of that size, that charts may lie in; ``packing_efficiency`` is over those in which some do.
 /// margin : float
 ///     Distance of charts, in texels, at least up to half of which gaps are searched for.
 /// threads : int
@@ -42,7 +44,7 @@ use crate::unwrap::{MeshArrays, Wishes};
 ///     ``chart_l2`` (a list); ``l_infinity``, ``angle_distortion``, ``area_distortion`` (all 1 at best);
 ///     ``flips`` (triangles), ``bent_quads`` (convex on the surface and not in UV), ``overlaps`` and ``overlaps_between`` islands (pairs of triangles; lower bounds unless
 ///     ``overlaps_complete``); ``seam_length`` over the root of the area and ``seam_length_absolute``;
-///     ``packing_efficiency``, ``gap_texels`` between islands (at most 8 or twice ``margin``; an upper bound unless
+///     ``packing_efficiency``, ``tiles`` (in which there are charts; 0 if one reaches beyond its tile), ``gap_texels`` between islands (at most 8 or twice ``margin``; an upper bound unless
 ///     ``gap_complete``), ``uv_box`` (its lower left and upper right corner). Where nothing could be measured, NaN.
 ///
 /// Raises

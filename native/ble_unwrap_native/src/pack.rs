@@ -16,10 +16,10 @@ use crate::settings;
 /// Attributes
 /// ----------
 /// uv : Array, (n, 2) float32
-///     A place in [0, 1]² for each point; (0, 0) for points of no chart.
+///     A place in [0, 1]² for each point, or in the square of a further tile; (0, 0) for points of no chart.
 /// report : dict
-///     ``charts``, ``packing_efficiency``, ``texels_per_unit``, ``texture_size`` and ``specks``: charts so small that
-///     they were enlarged to be seen at all.
+///     ``charts``, ``tiles`` (those in which charts lie), ``packing_efficiency`` (of these), ``texels_per_unit``, ``texture_size``, ``specks``
+///     (charts so small that they were enlarged to be seen at all) and ``warnings`` (a list of texts).
 #[pyclass(frozen, get_all, module = "ble_unwrap_native")]
 pub(crate) struct PackedCharts {
     uv: Py<Array>,
@@ -73,6 +73,12 @@ impl PackedCharts {
 ///     How charts may be turned. They are never mirrored.
 /// quality : {"fast", "normal", "high"}
 ///     How long a dense placement is searched for.
+/// tiles : int
+///     Over how many tiles charts may be spread, 1 to 100. Tile k, from 0, is the square of UV with its lower left corner at (k mod 10, k // 10), which
+///     is also called UDIM 1001 + k. No chart crosses the border of a tile, and a group stays in one; obstacles are in the way where they are.
+/// texel_density : float or None
+///     Texels to a unit of length of ``points``, for all charts. They get exactly that, in no more tiles than needed; where it does not fit into
+///     ``tiles`` tiles, they get the greatest density that is found, and ``warnings`` says so. None for the greatest that is found.
 /// threads : int
 ///     Threads to work with; 0 for as many as the machine has. The result does not depend on it.
 ///
@@ -85,7 +91,7 @@ impl PackedCharts {
 /// ------
 /// InvalidArgumentError
 ///     If an array has the wrong type, shape or indices, a setting is unknown or out of range, or the charts do not fit
-///     with their margin; with ``scale="fixed"`` the text tells the factor at which they would.
+///     with their margin; with ``scale="fixed"`` the text tells the factor at which they would, and a ``texel_density`` is one scale too many.
 /// Cancelled
 ///     If the job was cancelled.
 ///
@@ -132,10 +138,12 @@ pub(crate) fn pack(
         move |py, repacked| {
             let report = PyDict::new(py);
             report.set_item("charts", repacked.charts)?;
+            report.set_item("tiles", repacked.tiles)?;
             report.set_item("packing_efficiency", repacked.efficiency)?;
             report.set_item("texels_per_unit", repacked.texels_per_unit)?;
             report.set_item("texture_size", size)?;
             report.set_item("specks", repacked.specks)?;
+            report.set_item("warnings", repacked.warnings)?;
             let uv = Py::new(py, Array::from_f32_rows(repacked.uv))?;
             Ok(Py::new(py, PackedCharts { uv, report: report.unbind() })?.into_any())
         },

@@ -24,6 +24,8 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'
         seam_length,
         seam_length_absolute,
         packing_efficiency,
+        tiles,
+        texels_per_unit,
         gap_texels,
         seconds,
         rungs,
@@ -50,6 +52,8 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'
     dict.set_item("seam_length", seam_length)?;
     dict.set_item("seam_length_absolute", seam_length_absolute)?;
     dict.set_item("packing_efficiency", packing_efficiency)?;
+    dict.set_item("tiles", tiles)?;
+    dict.set_item("texels_per_unit", texels_per_unit)?;
     dict.set_item("gap_texels", gap_texels)?;
     dict.set_item("seconds", sums(py, seconds)?)?;
     dict.set_item("rungs", sums(py, rungs)?)?;
@@ -119,6 +123,7 @@ pub(crate) fn measures_to_dict(py: Python<'_>, layout: LayoutMeasures) -> PyResu
     dict.set_item("seam_length", measures.seam_length)?;
     dict.set_item("seam_length_absolute", measures.seam_length_absolute)?;
     dict.set_item("packing_efficiency", measures.packing_efficiency)?;
+    dict.set_item("tiles", measures.tiles)?;
     dict.set_item("gap_texels", measures.gap_texels)?;
     dict.set_item("gap_complete", measures.gap_complete)?;
     dict.set_item("uv_box", measures.uv_box)?;

@@ -17,7 +17,7 @@ use crate::settings;
 /// Attributes
 /// ----------
 /// uv : Array, (c, 2) float32
-///     A UV in [0, 1]² for each corner; (0, 0) at corners of faces without a chart.
+///     A UV in [0, 1]² for each corner, or in the square of a further tile; (0, 0) at corners of faces without a chart.
 /// chart : Array, (f,) int32
 ///     The chart of each face, from 0; -1 for faces that have a vertex with non-finite coordinates.
 /// report : dict
@@ -163,8 +163,8 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 /// Atlas
 ///     ``uv`` (c, 2) float32, ``chart`` (f,) int32, ``certificate``, the outcome of the exact checks, and ``report``, a dict with ``charts``, ``faces``,
 ///     ``unmapped_faces``, ``l2``, ``l2_chart_scale``, ``l2_worst_chart``, ``l_infinity``, ``angle_distortion``,
-///     ``area_distortion``, ``flips``, ``bent_quads``, ``overlaps``, ``seam_length``, ``packing_efficiency``, ``gap_texels``,
-///     ``chart_limit``, ``atlas_limit``, ``charts_over_limit``, ``rungs``, ``seconds``, ``warnings`` and more.
+///     ``area_distortion``, ``flips``, ``bent_quads``, ``overlaps``, ``seam_length``, ``packing_efficiency``, ``tiles``, ``texels_per_unit``,
+///     ``gap_texels``, ``chart_limit``, ``atlas_limit``, ``charts_over_limit``, ``rungs``, ``seconds``, ``warnings`` and more.
 ///
 /// Raises
 /// ------
@@ -188,6 +188,9 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 /// charts keep the margin, each chart is under ``chart_limit`` or counted in ``charts_over_limit`` (a single face may not
 /// flatten under it); ``l2`` is under ``atlas_limit`` or a warning says so. The result is the same, bit for bit, for any number of threads. Not guaranteed: the fewest charts
 /// or the shortest seams.
+///
+/// With several ``tiles``, charts are spread over them at one density, and each lies within one: tile k, from 0, is the square of UV with its lower left
+/// corner at (k mod 10, k // 10). With a ``texel_density`` no more tiles are used than needed; where it does not fit, a warning says what did.
 ///
 /// ``limit_over="atlas"`` bounds the root of the area-weighted mean of the charts' squared L2 stretch, as in UVAtlas.
 ///

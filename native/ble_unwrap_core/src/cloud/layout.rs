@@ -66,7 +66,9 @@ pub(super) fn lay_out(
     let footprints: Vec<Footprint> = own.par_iter().map(|&i| Footprint::new(&charts[i].uv, &charts[i].half)).collect();
     let items: Vec<PackItem<'_>> =
         footprints.iter().map(|f| PackItem { points: &f.points, triangles: &f.triangles }).collect();
-    let rest = PackSettings { height: settings.height - rows.height, ..settings.clone() };
+    // Clouds have one tile, at the density that fills it.
+    let rest =
+        PackSettings { height: settings.height - rows.height, tiles: 1, texel_density: None, ..settings.clone() };
     let packed = if items.is_empty() { None } else { Some(packing::pack(&items, &rest, progress)?) };
     let (poses, packed_share, packed_specks) =
         packed.as_ref().map_or((&[][..], 0.0, 0), |p| (&p.poses[..], p.efficiency, p.specks));

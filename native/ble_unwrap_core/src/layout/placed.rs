@@ -5,7 +5,7 @@ use nalgebra::Point2;
 use crate::charts::Chart;
 use crate::error::UnwrapError;
 use crate::mesh::{FaceId, MeshInput, Surface, VertexId};
-use crate::packing::{self, PackItem, PackSettings, Packed};
+use crate::packing::{self, PackItem, PackSettings, Packed, Shortfall};
 use crate::progress::Progress;
 use crate::rounding::{self, Rounding, RoundingError};
 
@@ -19,6 +19,8 @@ pub(super) struct Placed {
     /// Faces (of the surface) that rounding turned over, with their chart.
     pub(super) broken: Vec<(usize, FaceId)>,
     pub(super) specks: usize,
+    pub(super) texels_per_unit: f64,
+    pub(super) shortfall: Option<Shortfall>,
 }
 
 impl Placed {
@@ -29,23 +31,22 @@ impl Placed {
         packing: &PackSettings,
         progress: &Progress,
     ) -> Result<Self, UnwrapError> {
-        let packed = pack(charts, packing, progress)?;
+        let packed = pack(charts, surface.scale, packing, progress)?;
         let size = packed.size.map(f64::from);
-        let rounding = Rounding { texel: size.map(|s| 1.0 / s), diagonal: surface.diagonal };
         let mut layout = Self {
             uv: vec![[0.0; 2]; input.corner_vertices.len()],
             face_chart: vec![-1; surface.mesh.face_count()],
             polygon_chart: vec![-1; input.face_offsets.len().saturating_sub(1)],
             broken: Vec::new(),
             specks: packed.specks,
+            texels_per_unit: packed.texels_per_unit,
+            shortfall: packed.shortfall,
         };
-        for (number, (chart, pose)) in charts.iter().zip(&packed.poses).enumerate() {
+        for (number, (chart, tile)) in charts.iter().zip(&packed.tiles).enumerate() {
             progress.check()?;
-            let place = |p: &Point2<f64>| {
-                let texel = pose.texel(*p);
-                Point2::new(texel.x / size[0], texel.y / size[1])
-            };
-            let exact: Vec<Point2<f64>> = chart.uv.iter().map(place).collect();
+            let exact: Vec<Point2<f64>> = chart.uv.iter().map(|p| packed.uv(number, *p)).collect();
+            let texel = size.map(|s| 1.0 / s);
+            let rounding = Rounding { texel, corner: tile.corner(), diagonal: surface.diagonal };
             let halves = quads::convex_halves(chart);
             let uv = match rounding::round_to_f32(&chart.patch.mesh, &halves, &exact, &rounding, progress) {
                 Ok(rounded) => rounded.uv,
@@ -75,11 +76,18 @@ impl Placed {
     }
 }
 
-fn pack(charts: &[Chart], packing: &PackSettings, progress: &Progress) -> Result<Packed, UnwrapError> {
+/// Packs charts whose unit is `unit` units of the input, in which densities are given and told.
+fn pack(charts: &[Chart], unit: f64, packing: &PackSettings, progress: &Progress) -> Result<Packed, UnwrapError> {
     let index = |v: VertexId| u32::try_from(v.index()).unwrap_or(u32::MAX);
     let triangles: Vec<Vec<[u32; 3]>> =
         charts.iter().map(|c| c.patch.mesh.triangles().iter().map(|t| t.map(index)).collect()).collect();
     let items: Vec<PackItem<'_>> =
         charts.iter().zip(&triangles).map(|(c, t)| PackItem { points: &c.uv, triangles: t }).collect();
-    Ok(packing::pack(&items, packing, progress)?)
+    // A surface has unit area, so that what is out of range here fits into no texture, or is specks in any.
+    let in_unit = |density: f64| (density * unit).clamp(f64::MIN_POSITIVE, PackSettings::GREATEST_DENSITY);
+    let scaled = PackSettings { texel_density: packing.texel_density.map(in_unit), ..packing.clone() };
+    let packed = packing::pack(&items, &scaled, progress)?;
+    let told =
+        |s: Shortfall| Shortfall { wanted: packing.texel_density.unwrap_or(s.wanted), reached: s.reached / unit, ..s };
+    Ok(Packed { texels_per_unit: packed.texels_per_unit / unit, shortfall: packed.shortfall.map(told), ..packed })
 }

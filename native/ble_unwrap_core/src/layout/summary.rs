@@ -2,6 +2,7 @@
 
 use crate::mesh::{MeshInput, Surface, measure};
 use crate::metrics::{self, Measures};
+use crate::packing::Shortfall;
 use crate::report::{Report, counted};
 use crate::settings::{LimitOver, Settings};
 
@@ -19,6 +20,7 @@ pub(super) fn report_of(
     let mut report = Report::new(measures, settings.chart_limit());
     report.faces = input.face_offsets.len().saturating_sub(1);
     report.unmapped_faces = surface.unmapped.len();
+    report.texels_per_unit = layout.texels_per_unit;
     report.warnings = warnings(surface, layout);
     if measures.faces > measures.unmapped_faces && measures.l2.is_nan() {
         report.warnings.push(
@@ -51,6 +53,7 @@ fn warnings(surface: &Surface, layout: &Placed) -> Vec<String> {
         let specks = counted(layout.specks, ["chart smaller than a texel was", "charts smaller than a texel were"]);
         list.push(format!("{specks} enlarged to one"));
     }
+    list.extend(layout.shortfall.iter().map(Shortfall::to_string));
     let area = measure::total_area(&surface.mesh);
     if surface.mesh.face_count() > 0 && area <= 0.0 {
         list.push("no face has an area".into());

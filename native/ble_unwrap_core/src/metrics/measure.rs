@@ -7,6 +7,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::memory;
+use crate::packing::Tile;
 use crate::progress::{Cancelled, Progress};
 
 use super::gap::{GAP_SEARCH_TEXELS, OwnedSegment, least_gap};
@@ -99,8 +100,10 @@ pub struct Measures {
     pub seam_length: f64,
     /// Length of the seams in the unit of the mesh.
     pub seam_length_absolute: f64,
-    /// Share of the unit square that is covered; for a layout outside the unit square, share of its bounding square. Area
-    /// that a pair of triangles covers twice is subtracted once for each pair, so the value means nothing if
+    /// Number of tiles in which triangles lie; 0 if one lies in none of those that there are.
+    pub tiles: usize,
+    /// Share of the tiles in which triangles lie, or of the unit square if there is only one tile, that is covered; for a layout outside of all tiles,
+    /// share of its bounding square. Area that a pair of triangles covers twice is subtracted once for each pair, so the value means nothing if
     /// `overlaps_complete` is false.
     pub packing_efficiency: f64,
     /// Least distance between two islands in texels; 0 if boundaries cross. A distance above eight texels and above twice
@@ -178,6 +181,7 @@ pub(crate) fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Ca
         overlaps_complete: true,
         seam_length: topology.seam_length / surface.sqrt(),
         seam_length_absolute: topology.seam_length * unit,
+        tiles: 0,
         packing_efficiency: 0.0,
         gap_texels: 0.0,
         gap_complete: true,
@@ -207,10 +211,29 @@ pub(crate) fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Ca
     out.overlaps_complete = common.complete;
 
     let covered = (uv_area - common.area).max(0.0);
-    let inside = (0..2).all(|k| uv_box[0][k] >= -RANGE_SLACK && uv_box[1][k] <= 1.0 + RANGE_SLACK);
-    let whole = if inside { aspect[0] * aspect[1] } else { longest_extent.max(1e-30).powi(2) };
+    let tiles = tiles_used(&uv, aspect, mesh.texture().tiles);
+    out.tiles = tiles.unwrap_or(0);
+    let whole = match tiles {
+        Some(used) => aspect[0] * aspect[1] * used.max(1) as f64,
+        None => longest_extent.max(1e-30).powi(2),
+    };
     out.packing_efficiency = if common.complete { covered / whole } else { (covered / whole).min(1.0) };
     Ok(out)
+}
+
+/// Number of tiles in which triangles lie, `None` if one lies in none of the first `count`. A triangle is in the tile that its centre is in, and
+/// must not reach beyond; triangles without a UV are NaN. UVs have the proportions of the texture.
+fn tiles_used(uv: &[[[f64; 2]; 3]], aspect: [f64; 2], count: usize) -> Option<usize> {
+    let mut is_used = vec![false; count.max(1)];
+    for corners in uv.iter().filter(|corners| !corners[0][0].is_nan()) {
+        let corners = corners.map(|p| [0, 1].map(|k| p[k] / aspect[k]));
+        let tile = Tile::near([0, 1].map(|k| corners.iter().map(|p| p[k]).sum::<f64>() / 3.0), count);
+        if !corners.iter().all(|&p| tile.holds(p, RANGE_SLACK)) {
+            return None;
+        }
+        is_used[tile.number()] = true;
+    }
+    Some(is_used.iter().filter(|used| **used).count())
 }
 
 /// What one triangle contributes.

@@ -13,19 +13,22 @@ pub(crate) struct Texture {
     pub height: u32,
     /// Wanted distance between charts, in texels.
     pub margin: f64,
+    /// Number of tiles that charts may lie in, each of that width and height.
+    pub tiles: usize,
 }
 
 impl Texture {
     /// A square texture.
     #[cfg(test)]
     pub(crate) fn square(size: u32, margin: f64) -> Self {
-        Self { width: size, height: size, margin }
+        Self { width: size, height: size, margin, tiles: 1 }
     }
 
     /// The texture that charts are packed into.
     #[must_use]
     pub(crate) fn of(packing: &PackSettings) -> Self {
-        Self { width: packing.width, height: packing.height, margin: packing.margin_texels }
+        let PackSettings { width, height, margin_texels: margin, tiles, .. } = *packing;
+        Self { width, height, margin, tiles }
     }
 
     /// Factors that turn UV into texels; a side of no texels counts as one.

@@ -8,12 +8,12 @@ use super::many::{self, ROWS_ONLY, ROWS_TRIED};
 use super::mask::Reach;
 use super::obstacles::Obstacles;
 use super::outline::Outline;
-use super::placement::Dense;
+use super::placement::{Dense, Place};
 use super::pose::base_turns;
 use super::refine::Refinement;
 use super::search::Search;
 use super::shape::SAFETY_TEXELS;
-use super::sketch::{growth, most_promising};
+use super::sketch::{Sketch, Spot, growth, most_promising};
 use super::{Constraints, PackError, PackSettings, Quality, Rotation};
 use crate::progress::{Cancelled, Progress};
 
@@ -36,7 +36,9 @@ const OTHER_BEGINNINGS: &[f64] = &[0.95];
 /// Vertices of outlines are moved together on a lattice of so many cells of the coarse grid.
 const COARSENED: f64 = 0.3;
 /// A scale that differs from the given one by less than this share has it: only rounding sets them apart.
-const SAME_SCALE: f64 = 1e-9;
+pub(super) const SAME_SCALE: f64 = 1e-9;
+/// A sketch so many times denser than needed is expected to have room for all charts on the fine grid at the density needed.
+const SURE: f64 = 1.03;
 /// Attempts of the search on the fine grid, where no sketch could be refined.
 const LAST_RESORT: usize = 10;
 
@@ -112,8 +114,11 @@ pub(super) fn densest(
     }
 }
 
-/// The same, where a given scale is a bound.
-fn densest_up_to(
+/// The same, where a given scale is a bound. Where there are several tiles or a texel density, the search ends once that bound is reached.
+///
+/// # Errors
+/// As [`densest`], but [`PackError::TooLarge`].
+pub(super) fn densest_up_to(
     outlines: &[Outline],
     constraints: &Constraints<'_>,
     settings: &PackSettings,
@@ -154,6 +159,8 @@ fn densest_up_to(
         reach: reach.clone(),
         obstacles: obstacles.clone(),
         budget: LAST_RESORT,
+        enough: f64::INFINITY,
+        is_whole: settings.tiles == 1,
         progress,
     };
     let mut trials = Trials::default();
@@ -172,44 +179,63 @@ fn densest_up_to(
         Quality::Fast if n < ROWS_TRIED => None,
         _ => many::in_rows(&fine, &areas, margin, [guess, ceiling])?,
     };
-    if n >= ROWS_ONLY {
+    // Where the result cannot become better, the search is not gone on with. Of one tile with a given scale it is, since what is found last is taken.
+    let stops_early = settings.tiles > 1 || settings.texel_density.is_some();
+    let rows_suffice = stops_early && in_rows.as_ref().is_some_and(|rows| rows.density >= ceiling);
+    if n >= ROWS_ONLY || rows_suffice {
         return in_rows.map(|dense| (dense, trials)).ok_or(no_room);
     }
-    let mut sketches = Vec::new();
-    for effort in Effort::new(n, settings.quality) {
-        let more = if effort.angles == FEW_ANGLES { None } else { Some(turns_of(effort.angles)?) };
-        let across = (effort.across * (n as f64).sqrt()).clamp(effort.least, effort.most);
-        let coarse = Grid::coarse(settings, border, across);
-        let lattice = |o: &Outline| (COARSENED * coarse.cell / (guess * o.extent)).clamp(1e-6, 0.1);
-        let simple = |o: &Outline| {
-            progress.check()?;
-            Ok(o.coarsened(lattice(o)))
-        };
-        let simple: Vec<Outline> = outlines.par_iter().map(simple).collect::<Result<_, Cancelled>>()?;
-        let (growth, reach) = (growth(margin, coarse), Reach::new(0.0));
-        let search = Search {
-            outlines: &simple,
-            turns: more.as_ref().unwrap_or(&turns),
-            grid: coarse,
-            growth,
-            obstacles: Obstacles::new(constraints.obstacles, coarse, growth, &reach, progress)?,
-            reach,
-            budget: effort.attempts,
-            ..fine
-        };
-        let mut found = Vec::new();
-        for share in effort.beginnings {
-            // Sketches do not regard a given scale: what is drawn denser has room at the scale.
-            let search = search.run(share * guess, largest_scale)?;
-            trials.attempts += search.attempts;
-            found.extend(search.sketches);
+    let obstacles = obstacles.as_ref();
+    let mut refined = None;
+    // Where what was thought enough turns out to be too little, all is searched.
+    for enough in [if stops_early { SURE * most } else { f64::INFINITY }, f64::INFINITY] {
+        let mut sketches: Vec<Sketch> = Vec::new();
+        for effort in Effort::new(n, settings.quality) {
+            let more = if effort.angles == FEW_ANGLES { None } else { Some(turns_of(effort.angles)?) };
+            let across = (effort.across * (n as f64).sqrt()).clamp(effort.least, effort.most);
+            let coarse = Grid::coarse(settings, border, across);
+            let lattice = |o: &Outline| (COARSENED * coarse.cell / (guess * o.extent)).clamp(1e-6, 0.1);
+            let simple = |o: &Outline| {
+                progress.check()?;
+                Ok(o.coarsened(lattice(o)))
+            };
+            let simple: Vec<Outline> = outlines.par_iter().map(simple).collect::<Result<_, Cancelled>>()?;
+            let (growth, reach) = (growth(margin, coarse), Reach::new(0.0));
+            let search = Search {
+                outlines: &simple,
+                turns: more.as_ref().unwrap_or(&turns),
+                grid: coarse,
+                growth,
+                obstacles: Obstacles::new(constraints.obstacles, coarse, growth, &reach, progress)?,
+                reach,
+                budget: effort.attempts,
+                enough,
+                ..fine
+            };
+            let mut found = Vec::new();
+            for share in effort.beginnings {
+                // Sketches do not regard a given scale: what is drawn denser has room at the scale.
+                let search = search.run((share * guess).min(enough), largest_scale)?;
+                trials.attempts += search.attempts;
+                found.extend(search.sketches);
+                if search.best.is_some_and(|best| best.density >= enough) {
+                    break;
+                }
+            }
+            sketches.extend(most_promising(found, effort.sketches));
+            if sketches.iter().any(|sketch| sketch.density >= enough) {
+                break;
+            }
         }
-        sketches.extend(most_promising(found, effort.sketches));
+        let mut refinement =
+            Refinement { outlines, grid, reach: &reach, obstacles, ceiling, stops_early, placements: 0, progress };
+        refined = refinement.best_of(&sketches)?;
+        trials.placements += refinement.placements;
+        let ended_early = sketches.iter().any(|sketch| sketch.density >= enough);
+        if !ended_early || refined.as_ref().is_some_and(|dense| dense.density >= ceiling) {
+            break;
+        }
     }
-    let mut refinement =
-        Refinement { outlines, grid, reach: &reach, obstacles: obstacles.as_ref(), ceiling, placements: 0, progress };
-    let refined = refinement.best_of(&sketches)?;
-    trials.placements = refinement.placements;
     let denser = |a: Dense, b: Dense| if b.density > a.density { b } else { a };
     if let Some(dense) = refined.into_iter().chain(in_rows).reduce(denser) {
         return Ok((dense, trials));
@@ -223,6 +249,35 @@ fn densest_up_to(
         None => fine.once((0.5 / largest).min(most))?,
     };
     best.map(|best| (best.dense(grid), trials)).ok_or(no_room)
+}
+
+/// A placement of outlines at a lower density, the given scale, with every chart near where it was; `None` where that does not fit so. It costs
+/// no search, and is expected to fit, since smaller charts need less room.
+///
+/// # Errors
+/// [`PackError::Cancelled`].
+pub(super) fn thinned(
+    outlines: &[Outline],
+    places: &[Option<Place>],
+    constraints: &Constraints<'_>,
+    settings: &PackSettings,
+    progress: &Progress,
+) -> Result<Option<Dense>, PackError> {
+    let Some(ceiling) = constraints.scale else { return Ok(None) };
+    let grid = Grid::new(settings, constraints.border(settings), outlines.len());
+    let reach = Reach::new(settings.margin_texels / grid.cell);
+    let obstacles = Obstacles::new(constraints.obstacles, grid, SAFETY_TEXELS / grid.cell, &reach, progress)?;
+    let spot = |place: &Place| {
+        let (turn, centre) = grid.texture_to_frame(place.pose);
+        Spot { turn, centre }
+    };
+    let spots = places.iter().map(|place| place.as_ref().map(spot)).collect();
+    let sketch = Sketch { spots, density: ceiling, cell: grid.cell };
+    let obstacles = obstacles.as_ref();
+    let reach = &reach;
+    let mut refinement =
+        Refinement { outlines, grid, reach, obstacles, ceiling, stops_early: true, placements: 0, progress };
+    Ok(refinement.best_of(&[sketch])?.filter(|dense| dense.density >= ceiling))
 }
 
 /// Base angles to try, by chart; `areas` tell which are large.
@@ -295,6 +350,8 @@ mod tests {
             reach: Reach::new(0.0),
             obstacles: None,
             budget: 1,
+            enough: f64::INFINITY,
+            is_whole: true,
             progress,
         };
         assert!(search(&stopped).shapes(1.0).is_err());

@@ -83,6 +83,15 @@ impl Grid {
         self.frame_to_texture(Pose { scale: pose.scale * self.cell, offset: pose.offset * self.cell, ..pose })
     }
 
+    /// The turn of a pose in texels of the texture and where its centre goes, both in the grid's frame; the latter in texels from the texture's corner.
+    pub(super) fn texture_to_frame(self, pose: Pose) -> ([f64; 2], [f64; 2]) {
+        if self.sideways {
+            ([-pose.sin, pose.cos], [self.height - pose.offset.y, pose.offset.x])
+        } else {
+            ([pose.cos, pose.sin], pose.offset.into())
+        }
+    }
+
     /// A pose in texels from the grid's corner as a pose in texels of the texture.
     pub(super) fn frame_to_texture(self, pose: Pose) -> Pose {
         let offset = pose.offset + Vector2::repeat(self.border);
@@ -103,6 +112,17 @@ mod tests {
     fn grid(width: u32, height: u32, margin_texels: f64, charts: usize) -> Grid {
         let settings = PackSettings { width, height, margin_texels, ..PackSettings::default() };
         Grid::new(&settings, 0.5 * margin_texels, charts)
+    }
+
+    #[test]
+    fn poses_come_back_from_the_texture_as_they_went() {
+        for (width, height) in [(640, 480), (480, 640)] {
+            let g = grid(width, height, 4.0, 10);
+            let offset = Vector2::new(7.0, 30.0);
+            let pose = Pose { cos: 0.8, sin: 0.6, centre: Point2::origin(), scale: 3.0, offset };
+            let (turn, centre) = g.texture_to_frame(g.frame_to_texture(pose));
+            assert_eq!((turn, centre), ([0.8, 0.6], [7.0 + g.border, 30.0 + g.border]));
+        }
     }
 
     #[test]

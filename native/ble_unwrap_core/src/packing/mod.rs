@@ -25,7 +25,9 @@
 //! 7. `settle`, `refine`: the few densest sketches on the fine grid, each chart in its one pose and a
 //!    small window around its place, grown until they no longer fit. Here the guarantee is made.
 //! 8. `many`, `shelves`: thousands of charts as boxes in rows around the large ones among them.
-//! 9. `density` is the whole of it; `alone` a single chart, where there is nothing to search.
+//! 9. `density` is the whole of it for one texture; `alone` a single chart, where there is nothing to search.
+//! 10. `spread`, for several tiles or a density that is given: which chart goes into which tile, each of which is packed by 1 to 9.
+//!     `tile` says where tiles lie, `shortfall` what the user is told of a density that does not fit.
 //!
 //! `constraints` are what a caller may ask for in addition. `obstacles` are cells that are occupied from the start, by the same raster
 //! and the same distance between cells, so that the guarantee holds for them as it does between charts.
@@ -60,9 +62,14 @@ mod search;
 mod settle;
 mod shape;
 mod shelves;
+mod shortfall;
 mod sketch;
+mod spread;
 #[cfg(test)]
 mod tests;
+mod tile;
+#[cfg(test)]
+mod tiled_tests;
 
 use nalgebra::{Point2, Vector2};
 use rayon::prelude::*;
@@ -75,6 +82,9 @@ use crate::progress::{Cancelled, Progress};
 pub(crate) use constraints::Constraints;
 pub(crate) use outline::LARGEST;
 use outline::Outline;
+pub(crate) use shortfall::Shortfall;
+use spread::Spread;
+pub(crate) use tile::Tile;
 
 /// Which rotations a chart may take. Charts are never mirrored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -132,16 +142,27 @@ pub struct PackSettings {
     pub rotation: Rotation,
     /// How long to search.
     pub quality: Quality,
+    /// Over how many tiles of the texture charts may be spread, 1 to [`PackSettings::MOST_TILES`], each as large as `width` by `height`. Tile k, from
+    /// 0, is the square of UV whose lower left corner is (k mod 10, ⌊k / 10⌋), also known as UDIM 1001 + k. No chart crosses the border of its tile.
+    pub tiles: usize,
+    /// The density of all charts in texels to a unit of length, above 0, or `None` for the greatest that is found. With a given one, no more tiles are
+    /// used than are needed; where it does not fit into `tiles` tiles, charts get the greatest density that is found, with a warning.
+    pub texel_density: Option<f64>,
 }
 
 impl PackSettings {
     /// Largest width or height of a texture.
     pub const LARGEST_SIZE: u32 = 32_768;
+    /// Most tiles: ten rows of ten.
+    pub const MOST_TILES: usize = Tile::MOST;
+    /// Greatest texel density that can be asked for: the largest texture upon a surface of 30 millionths of a unit. It is a bound only so that
+    /// products with it are finite.
+    pub const GREATEST_DENSITY: f64 = 1e9;
 
     /// The paper's: a margin of two texels at a texture size of 1024, and quarter turns.
     #[must_use]
     pub fn paper() -> Self {
-        Self { margin_texels: 2.0, width: 1024, height: 1024, rotation: Rotation::Quarter, quality: Quality::Fast }
+        Self { margin_texels: 2.0, width: 1024, height: 1024, rotation: Rotation::Quarter, ..Self::default() }
     }
 
     fn check(&self) -> Result<(), PackError> {
@@ -152,6 +173,12 @@ impl PackSettings {
         if !(self.margin_texels >= 0.0 && self.margin_texels.is_finite()) {
             return Err(PackError::Margin { margin: self.margin_texels });
         }
+        if !(1..=Self::MOST_TILES).contains(&self.tiles) {
+            return Err(PackError::Tiles { tiles: self.tiles });
+        }
+        if let Some(density) = self.texel_density.filter(|&d| !(d > 0.0 && d <= Self::GREATEST_DENSITY)) {
+            return Err(PackError::TexelDensity { density });
+        }
         Ok(())
     }
 }
@@ -159,7 +186,15 @@ impl PackSettings {
 impl Default for PackSettings {
     /// A margin of four texels at a texture size of 2048, and charts with straight borders along the axes.
     fn default() -> Self {
-        Self { margin_texels: 4.0, width: 2048, height: 2048, rotation: Rotation::Aligned, quality: Quality::Fast }
+        Self {
+            margin_texels: 4.0,
+            width: 2048,
+            height: 2048,
+            rotation: Rotation::Aligned,
+            quality: Quality::Fast,
+            tiles: 1,
+            texel_density: None,
+        }
     }
 }
 
@@ -204,17 +239,34 @@ impl Pose {
 /// The result of [`pack`].
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Packed {
-    /// A pose an item, in their order.
+    /// A pose an item, in their order: texels from the corner of its tile.
     pub poses: Vec<Pose>,
-    /// Area covered by charts over the area of the texture. A chart that overlaps itself counts its
+    /// The tile of each item.
+    pub tiles: Vec<Tile>,
+    /// Number of tiles in which charts or obstacles lie.
+    pub tiles_used: usize,
+    /// Area covered by charts over the area of the tiles used. A chart that overlaps itself counts its
     /// triangles' areas, but no more than the cells it touches.
     pub efficiency: f64,
     /// The density all charts but specks share, in texels to a unit of the chart plane.
     pub texels_per_unit: f64,
+    /// Where the density that was asked for does not fit: what did.
+    pub shortfall: Option<Shortfall>,
     /// Charts scaled up to about a texel, individually.
     pub specks: usize,
-    /// Width and height of the texture.
+    /// Width and height of a tile.
     pub size: [u32; 2],
+}
+
+impl Packed {
+    /// Where a point of an item's plane goes, in UV.
+    #[inline]
+    #[must_use]
+    pub(crate) fn uv(&self, item: usize, p: Point2<f64>) -> Point2<f64> {
+        let texel = self.poses[item].texel(p);
+        let corner = self.tiles[item].corner();
+        Point2::new(texel.x / f64::from(self.size[0]) + corner[0], texel.y / f64::from(self.size[1]) + corner[1])
+    }
 }
 
 /// Why charts could not be packed.
@@ -231,6 +283,21 @@ pub enum PackError {
         width: u32,
         /// Height asked for.
         height: u32,
+    },
+    /// The number of tiles is none that a layout can have.
+    #[error("{tiles} tiles cannot be packed: choose 1 to {}", PackSettings::MOST_TILES)]
+    Tiles {
+        /// Number asked for.
+        tiles: usize,
+    },
+    /// The texel density is not a positive number, or too great.
+    #[error(
+        "a texel density of {density} is none: choose a number above 0 and at most {}",
+        PackSettings::GREATEST_DENSITY
+    )]
+    TexelDensity {
+        /// Density asked for.
+        density: f64,
     },
     /// The margin is negative or not finite.
     #[error("a margin of {margin} texels is not a distance: choose 0 or more")]
@@ -335,6 +402,8 @@ impl PackError {
     pub fn kind(&self) -> ErrorKind {
         match self {
             Self::TextureSize { .. }
+            | Self::Tiles { .. }
+            | Self::TexelDensity { .. }
             | Self::Margin { .. }
             | Self::Border { .. }
             | Self::BorderTooLarge { .. }
@@ -365,10 +434,10 @@ fn require_memory(items: &[PackItem<'_>]) -> Result<(), Cancelled> {
     memory::require(needed).map_err(Cancelled::OutOfMemory)
 }
 
-/// Poses that place all charts in the texture, at the greatest common density found.
+/// Poses that place all charts in the texture, or in its tiles, at the density asked for or else the greatest common density found.
 ///
 /// Guaranteed, also after rounding UVs to f32: two different charts are at least the margin apart,
-/// every chart lies within the texture at least half a margin from its border, none is mirrored, and
+/// every chart lies within one tile at least half a margin from its border, none is mirrored, and
 /// each is at least about a texel large in its larger extent (unless all its points coincide). The
 /// result is a function of items and settings, whatever the number of threads. Not guaranteed: the
 /// greatest possible density, nor that one more chart or a little less margin never costs density.
@@ -409,21 +478,35 @@ pub(crate) fn pack_within(
         Ok(Outline { keeps_size: constraints.scale.is_some(), ..Outline::new(item, i)? })
     };
     let outlines: Vec<Outline> = items.par_iter().enumerate().map(outline).collect::<Result<_, PackError>>()?;
-    let (dense, _) = density::densest(&outlines, constraints, settings, progress)?;
+    let is_single = settings.tiles == 1 && settings.texel_density.is_none();
+    let Spread { dense, tiles, shortfall } = if is_single {
+        Spread::on_one_tile(density::densest(&outlines, constraints, settings, progress)?.0)
+    } else {
+        spread::spread(&outlines, constraints, settings, progress)?
+    };
     let texels = f64::from(settings.width) * f64::from(settings.height);
     let middle = 0.5 * Vector2::new(f64::from(settings.width), f64::from(settings.height));
-    let mut covered =
-        obstacles::covered(constraints.obstacles, [settings.width, settings.height].map(f64::from), progress)?;
+    let mut is_used = vec![false; settings.tiles];
+    let mut covered = 0.0;
+    for tile in Tile::first(settings.tiles) {
+        let obstacles = obstacles::in_tile(constraints.obstacles, tile, settings);
+        let of_tile = obstacles::covered(&obstacles, [settings.width, settings.height].map(f64::from), progress)?;
+        is_used[tile.number()] = of_tile > 0.0;
+        covered += of_tile;
+    }
     let mut poses = Vec::with_capacity(items.len());
-    for (outline, place) in outlines.iter().zip(&dense.places) {
+    for ((outline, place), tile) in outlines.iter().zip(&dense.places).zip(&tiles) {
         // Only items without triangles are not placed.
         let nowhere = Pose { cos: 1.0, sin: 0.0, centre: outline.centre, scale: dense.density, offset: middle };
         let pose = place.map_or(nowhere, |p| p.pose);
         let area = outline.area * (outline.extent * pose.scale).powi(2);
         covered += area.min(place.map_or(0.0, |p| p.touched));
+        is_used[tile.number()] |= place.is_some();
         poses.push(pose);
     }
     let specks = dense.places.iter().flatten().filter(|p| p.is_speck).count();
     let size = [settings.width, settings.height];
-    Ok(Packed { poses, efficiency: covered / texels, texels_per_unit: dense.density, specks, size })
+    let tiles_used = is_used.iter().filter(|used| **used).count();
+    let efficiency = covered / (texels * tiles_used.max(1) as f64);
+    Ok(Packed { poses, tiles, tiles_used, efficiency, texels_per_unit: dense.density, shortfall, specks, size })
 }

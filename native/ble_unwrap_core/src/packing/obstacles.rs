@@ -1,9 +1,13 @@
 //! What is in the way before any chart is placed.
 
+use std::borrow::Cow;
+
 use nalgebra::{Point2, Vector2};
 
+use super::PackSettings;
 use super::grid::Grid;
 use super::mask::{Mask, Reach};
+use super::tile::Tile;
 use crate::progress::{Cancelled, Progress};
 
 /// Triangles between two looks at whether to stop: a few milliseconds of work.
@@ -74,6 +78,26 @@ impl Obstacles {
         let cells = self.free_below[rows.min(top)] + self.columns * rows.saturating_sub(top);
         cells as f64 / self.free().max(1) as f64
     }
+}
+
+/// The triangles that matter in a tile, in texels from its corner; `triangles` are in texels from the origin of UV. They matter if their box comes
+/// within a margin of the tile, and a texel for all that they are grown by. Where there is only one tile, it gets all.
+pub(super) fn in_tile<'a>(
+    triangles: &'a [[Point2<f64>; 3]],
+    tile: Tile,
+    settings: &PackSettings,
+) -> Cow<'a, [[Point2<f64>; 3]]> {
+    if settings.tiles == 1 {
+        return Cow::Borrowed(triangles);
+    }
+    let size = [f64::from(settings.width), f64::from(settings.height)];
+    let corner = [0, 1].map(|k| tile.corner()[k] * size[k]);
+    let near = settings.margin_texels + 1.0;
+    let matters = |t: &&[Point2<f64>; 3]| {
+        (0..2)
+            .all(|k| t.iter().any(|p| p[k] >= corner[k] - near) && t.iter().any(|p| p[k] <= corner[k] + size[k] + near))
+    };
+    triangles.iter().filter(matters).map(|t| t.map(|p| p - Vector2::from(corner))).collect()
 }
 
 /// Area of a texture of the given size that triangles in texels cover: the sum of their areas within it, but no more than the area of the

@@ -38,6 +38,8 @@ pub(super) struct Refinement<'a> {
     pub(super) obstacles: Option<&'a Obstacles>,
     /// Texels to a unit of the chart plane at most.
     pub(super) ceiling: f64,
+    /// Whether further sketches are left alone once that is reached.
+    pub(super) stops_early: bool,
     /// Placements made.
     pub(super) placements: u32,
     pub(super) progress: &'a Progress,
@@ -60,6 +62,9 @@ impl Refinement<'_> {
         for sketch in sketches {
             let above = best.as_ref().map(|b| b.density * BETTER);
             best = self.grown(sketch, above)?.or(best);
+            if self.stops_early && best.as_ref().is_some_and(|b| b.density >= self.ceiling) {
+                break;
+            }
         }
         Ok(best.map(|fit| self.dense(fit)))
     }

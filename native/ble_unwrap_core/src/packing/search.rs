@@ -91,6 +91,10 @@ pub(super) struct Search<'a> {
     pub(super) obstacles: Option<Obstacles>,
     /// Attempts from the first fit on.
     pub(super) budget: usize,
+    /// Density from which on a placement that fits ends the search.
+    pub(super) enough: f64,
+    /// Whether the search is all of packing, or else that of one tile among several, which is no measure of the progress made.
+    pub(super) is_whole: bool,
     pub(super) progress: &'a Progress,
 }
 
@@ -158,7 +162,9 @@ impl Search<'_> {
         let (mut step, mut idle, mut shrinks) = (STEP, 0, 0);
         let mut shapes = self.shapes(density)?;
         while made < self.budget && shrinks < SHRINKS {
-            self.progress.advance(Stage::Pack, made as f64 / self.budget as f64);
+            if self.is_whole {
+                self.progress.advance(Stage::Pack, made as f64 / self.budget as f64);
+            }
             let strategies = match &lead {
                 None if !near => Strategy::portfolio(&shapes, BRACKETING),
                 None => Strategy::portfolio(&shapes, if n < MANY { COMPARED } else { VARIED }),
@@ -171,9 +177,12 @@ impl Search<'_> {
             let count = strategies.len();
             all_made += count;
             let attempts = self.attempts(&shapes, strategies)?;
-            let sketch = |a: &Attempt| match self.obstacles {
-                None => Sketch::of(&a.layout, &shapes, self.grid, density),
-                Some(_) => (a.used <= 1.0).then(|| Sketch::between_obstacles(&a.layout, &shapes, self.grid, density)),
+            let sketch = |a: &Attempt| {
+                if self.obstacles.is_none() && density < self.enough {
+                    Sketch::of(&a.layout, &shapes, self.grid, density)
+                } else {
+                    (a.used <= 1.0).then(|| Sketch::at_its_density(&a.layout, &shapes, self.grid, density))
+                }
             };
             sketches.extend(attempts.iter().filter_map(sketch));
             let Some(Attempt { used, layout, strategy }) = least(attempts) else { break };
@@ -182,6 +191,9 @@ impl Search<'_> {
             if used <= 1.0 {
                 // Every density tried lies above the best that fitted: this one is better.
                 best = Some(Best { shapes, layout, density });
+                if density >= self.enough {
+                    break;
+                }
                 near = used > 1.0 - 2.0 * NEAR;
                 if count > BRACKETING {
                     lead = Some((f64::INFINITY, strategy));

@@ -53,9 +53,9 @@ impl Sketch {
         Some(sketch)
     }
 
-    /// The sketch an attempt at `density` made between obstacles, where it placed all charts below the top of the grid. How much of the
-    /// height it used says nothing there.
-    pub(super) fn between_obstacles(layout: &Layout, shapes: &[Shape], grid: Grid, density: f64) -> Self {
+    /// The sketch an attempt at `density` made, where it placed all charts below the top of the grid. Between obstacles how much of the
+    /// height it used says nothing, and where the density is all that is needed, it does not matter.
+    pub(super) fn at_its_density(layout: &Layout, shapes: &[Shape], grid: Grid, density: f64) -> Self {
         Self::drawn(layout, shapes, grid, density)
     }
 

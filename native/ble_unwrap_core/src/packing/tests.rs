@@ -204,7 +204,7 @@ fn margins_hold_for_every_kind_of_chart() {
             [Rotation::Aligned, Rotation::Any, Rotation::Quarter, Rotation::None].into_iter().enumerate()
         {
             let (width, height) = sizes[(n + m) % sizes.len()];
-            let settings = PackSettings { margin_texels: margin, width, height, rotation, quality: Quality::Fast };
+            let settings = PackSettings { margin_texels: margin, width, height, rotation, ..PackSettings::default() };
             let charts = mixture(18 + 6 * m, (10 * n + m) as u64);
             let packed = packed(&charts, &settings);
             let least = check(&charts, &settings, &packed);

@@ -43,8 +43,17 @@ const TRIES: usize = 50_000;
 pub(crate) struct Rounding {
     /// Size of a texel along u and v.
     pub texel: [f64; 2],
+    /// Lower left corner of the tile that the chart lies in, a square of side 1; whole numbers, at least 0.
+    pub corner: [f64; 2],
     /// Bounding box diagonal of the whole input mesh, in the unit of the chart's positions.
     pub diagonal: f64,
+}
+
+impl Rounding {
+    /// How much coarser the float32 grid is in this tile than below 1, at most: its far corner's larger coordinate.
+    fn coarseness(&self) -> f64 {
+        1.0 + self.corner[0].max(self.corner[1])
+    }
 }
 
 /// A rounded chart.
@@ -79,7 +88,7 @@ pub(crate) enum RoundingError {
     Cancelled(#[from] Cancelled),
 }
 
-/// Rounds the final UVs of a chart, one for each vertex of `mesh`, to float32 in [0, 1]. `halves` are further triangles over
+/// Rounds the final UVs of a chart, one for each vertex of `mesh`, to float32 in its tile. `halves` are further triangles over
 /// its vertices that should stay positive, too: those that quads have by their other diagonal.
 ///
 /// Guaranteed: every triangle of the result is strictly positive by an exact test; vertices whose
@@ -188,7 +197,12 @@ impl Mender<'_> {
         let p = self.mesh.triangle_positions(f);
         let (e1, e2) = (p[1] - p[0], p[2] - p[0]);
         let longest = e1.norm().max(e2.norm()).max((p[2] - p[1]).norm());
-        if e1.cross(&e2).norm() > DEGENERATE * self.rounding.diagonal * longest { HEIGHT as f32 } else { 0.0 }
+        if e1.cross(&e2).norm() > DEGENERATE * self.rounding.diagonal * longest { self.height() as f32 } else { 0.0 }
+    }
+
+    /// [`HEIGHT`] in this tile: a layout of several tiles has a larger extent, and a coarser grid.
+    fn height(&self) -> f64 {
+        HEIGHT * self.rounding.coarseness()
     }
 
     fn at(&self, v: VertexId) -> [f32; 2] {
@@ -231,7 +245,7 @@ impl Mender<'_> {
             let turned_halves = self.halves.turned.iter().map(|&k| self.halves.triangles[k]).collect();
             let lists: [Vec<[VertexId; 3]>; 3] =
                 [corners(&self.turned), if thin_too { corners(&self.thin) } else { Vec::new() }, turned_halves];
-            let reaches = [reach, reach.max(2.0 * HEIGHT), reach];
+            let reaches = [reach, reach.max(2.0 * self.height()), reach];
             for ((list, reach), tries) in lists.iter().zip(reaches).zip(&mut tries) {
                 for v in self.vertices_of(list, round >= NEIGHBOUR_ROUND) {
                     if *tries == 0 {
@@ -280,9 +294,10 @@ impl Mender<'_> {
         if !(home.x.is_finite() && home.y.is_finite()) {
             return false;
         }
-        // What may be moved to, relative to home: within reach and the unit square.
-        let lo = [0, 1].map(|k| (-reach[k]).max(-home[k]).min(0.0));
-        let hi = [0, 1].map(|k| reach[k].min(1.0 - home[k]).max(0.0));
+        // What may be moved to, relative to home: within reach and the tile.
+        let corner = self.rounding.corner;
+        let lo = [0, 1].map(|k| (-reach[k]).max(corner[k] - home[k]).min(0.0));
+        let hi = [0, 1].map(|k| reach[k].min(corner[k] + 1.0 - home[k]).max(0.0));
         let local = |p: [f32; 2]| Vector2::new(f64::from(p[0]) - home.x, f64::from(p[1]) - home.y);
         let faces = self.mesh.outgoing(v).map(|h| {
             let goal = f64::from(self.goal[h.face().index()]);
@@ -300,7 +315,7 @@ impl Mender<'_> {
                     constant + [0, 1].map(|k| (gradient[k] * lo[k]).max(gradient[k] * hi[k])).iter().sum::<f64>();
                 // No more than half of what this vertex alone can reach, or a face that others must
                 // mend would hide the rest.
-                let goal = goal.max(0.25 * f64::from(f32::EPSILON));
+                let goal = goal.max(0.25 * f64::from(f32::EPSILON) * self.rounding.coarseness());
                 let want = (goal * a.norm().max(b.norm()).max(d.norm())).min(0.5 * most);
                 Opposite { p, q, is_half, constraint: Constraint { gradient, constant, want } }
             })
@@ -312,7 +327,7 @@ impl Mender<'_> {
         let (mut winner, mut winning) = (self.at(v), current);
         for dx in [0, -1, 1] {
             for dy in [0, -1, 1] {
-                let p = [step(target[0], dx), step(target[1], dy)];
+                let p = [step(target[0], dx, corner[0]), step(target[1], dy, corner[1])];
                 let inside = (0..2).all(|k| (f64::from(p[k]) - home[k]).abs() <= share * self.rounding.texel[k]);
                 let score = self.score(&star, p, home);
                 if inside && score.beats(&winning) {
@@ -372,14 +387,14 @@ impl Score {
     }
 }
 
-/// A float32 neighbour of a coordinate that stays in [0, 1].
-fn step(x: f32, by: i32) -> f32 {
+/// A float32 neighbour of a coordinate that stays within 1 from `least` on.
+fn step(x: f32, by: i32, least: f64) -> f32 {
     match by {
         -1 => x.next_down(),
         1 => x.next_up(),
         _ => x,
     }
-    .clamp(0.0, 1.0)
+    .clamp(least as f32, (least + 1.0) as f32)
 }
 
 /// Twice the signed area; its sign is exact.

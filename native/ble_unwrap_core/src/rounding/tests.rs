@@ -8,7 +8,7 @@ use crate::metrics::{Texture, UvMesh};
 use crate::progress::Progress;
 use crate::verify::verify;
 
-const ROUNDING: Rounding = Rounding { texel: [1.0 / 2048.0; 2], diagonal: 1.5 };
+const ROUNDING: Rounding = Rounding { texel: [1.0 / 2048.0; 2], corner: [0.0; 2], diagonal: 1.5 };
 
 /// An n×n grid over the unit square whose inner columns are squeezed together in pairs: every second
 /// strip of triangles is `thin` wide. Each row is pushed sideways a little, so that no needle is
@@ -71,6 +71,30 @@ fn a_healthy_chart_is_rounded_plainly() {
     let r = round_to_f32(&mesh, &[], &uv, &ROUNDING, &Progress::new()).expect("nothing to mend");
     assert_eq!((r.moved, r.thin_faces), (0, 0));
     assert!(r.uv.iter().zip(&uv).all(|(a, b)| *a == [b.x as f32, b.y as f32]));
+}
+
+#[test]
+fn charts_are_rounded_and_mended_in_every_tile() {
+    for corner in [[1.0, 0.0], [3.0, 2.0], [9.0, 9.0]] {
+        let rounding = Rounding { corner, ..ROUNDING };
+        for thin in [1e-8, 1e-12] {
+            let (mesh, uv) = grid_with_needles(10, thin);
+            // To the border of the tile.
+            let uv = placed(&uv, 0.99, corner.map(|x| x + 0.001));
+            assert!(broken_by_plain_rounding(&mesh, &uv) > 10);
+            let r = round_to_f32(&mesh, &[], &uv, &rounding, &Progress::new()).expect("mendable");
+            assert!(all_positive(&mesh, &r.uv) && r.moved > 0);
+            for (v, (a, b)) in mesh.vertices().zip(r.uv.iter().zip(&uv)) {
+                let reach = if mesh.is_boundary_vertex(v) { BOUNDARY_REACH } else { INNER_REACH } / 2048.0;
+                for k in 0..2 {
+                    let x = f64::from(a[k]);
+                    assert!(x >= corner[k] && x <= corner[k] + 1.0, "{x} lies in the tile at {corner:?}");
+                    // Half a step of single precision, besides what mending may move it by.
+                    assert!((x - b[k]).abs() <= reach + 0.5f64.powi(21));
+                }
+            }
+        }
+    }
 }
 
 #[test]

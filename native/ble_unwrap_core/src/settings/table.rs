@@ -147,13 +147,17 @@ pub enum Group {
     Flattening,
     /// The texture that the result is for.
     Texture,
+    /// The tiles that the texture has. Clouds have one.
+    Tiles,
     /// How charts are placed in the texture.
     Packing,
+    /// How large charts are. Those of clouds fill the texture.
+    Density,
 }
 
 impl Group {
     /// All groups.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 13] = [
         Self::Charts,
         Self::Limit,
         Self::Weld,
@@ -164,7 +168,9 @@ impl Group {
         Self::Start,
         Self::Flattening,
         Self::Texture,
+        Self::Tiles,
         Self::Packing,
+        Self::Density,
     ];
 
     /// The group's name in lower case.
@@ -181,7 +187,9 @@ impl Group {
             Self::Start => "start",
             Self::Flattening => "flattening",
             Self::Texture => "texture",
+            Self::Tiles => "tiles",
             Self::Packing => "packing",
+            Self::Density => "density",
         }
     }
 
@@ -200,7 +208,9 @@ impl Group {
             Self::Start => &[Flatten, UnwrapPoints],
             Self::Flattening => &[Flatten],
             Self::Texture => &[Measure, Pack, UnwrapPoints],
+            Self::Tiles => &[Measure, Pack],
             Self::Packing => &[Pack, UnwrapPoints],
+            Self::Density => &[Pack],
         };
         function == Unwrap || others.contains(&function)
     }
@@ -446,4 +456,11 @@ pub static TABLE: &[Setting] = &[
         "How charts may be turned when they are packed."),
     row("quality", "Packing Quality", Group::Packing, Kind::Choice(|s| &mut s.packing.quality), "",
         "How long a dense placement of the charts is searched for."),
+    row("tiles", "Tiles", Group::Tiles, Kind::Whole(|s| &mut s.packing.tiles, [1, PackSettings::MOST_TILES]), "tiles",
+        "Over how many tiles of the texture charts may be spread: UDIM 1001, 1002 and so on, ten in a row. No chart crosses the border of a tile."),
+    row("texel_density", "Texel Density", Group::Density,
+        Kind::OptionalReal(|s| &mut s.packing.texel_density, Interval::above(0.0, PackSettings::GREATEST_DENSITY), "the greatest that is found"),
+        "texels per unit of length",
+        "How many texels a unit of length gets, in all charts. No more tiles are used than are needed for it; where there are too few, charts get the \
+         greatest density that is found, with a warning."),
 ];

@@ -125,7 +125,7 @@ pub fn measure_layout(
 /// atlas. `uv` holds one UV for each corner, and `chart` one number for each face, which is negative for faces without UVs.
 ///
 /// The certificate is [valid](Certificate::is_valid) if no triangle is turned over, no chart overlaps itself or another,
-/// all UVs lie in the unit square, and charts are at least the margin apart. Faces with the same number in `chart` are one
+/// all UVs lie in the unit square, or each chart in one of the tiles of the texture, and charts are at least the margin apart. Faces with the same number in `chart` are one
 /// chart. Faces are triangulated and consistently oriented as [`unwrap`](crate::unwrap()) does it. The certificate numbers
 /// the triangles made in this way, which are in the order of the faces. Of the settings, only those of welding and of the
 /// texture matter.

@@ -6,7 +6,7 @@ use nalgebra::Point2;
 use thiserror::Error;
 
 use crate::error_kind::ErrorKind;
-use crate::packing::{self, Constraints, PackError, PackItem, PackSettings, Packed};
+use crate::packing::{self, Constraints, PackError, PackItem, PackSettings, Shortfall};
 use crate::progress::{Cancelled, Progress, Stage};
 
 /// Elements of an array between two looks at whether to stop: a few milliseconds of work.
@@ -119,6 +119,12 @@ pub enum RepackError {
         /// How far it may be, in widths or heights of the texture.
         farthest: f64,
     },
+    /// Charts are to keep their size, and to have a texel density that is given as well.
+    #[error("charts that keep their size cannot be given a texel density of {density}; leave out one of the two")]
+    TwoScales {
+        /// The texel density.
+        density: f64,
+    },
     /// The charts do not fit, or cannot be packed for another reason. In this error, a group of charts counts as one chart.
     #[error(transparent)]
     Pack(#[from] PackError),
@@ -139,7 +145,8 @@ impl RepackError {
             | Self::GroupCount { .. }
             | Self::GroupsOfChart { .. }
             | Self::ObstacleCount { .. }
-            | Self::ObstacleFarAway { .. } => ErrorKind::Argument,
+            | Self::ObstacleFarAway { .. }
+            | Self::TwoScales { .. } => ErrorKind::Argument,
             Self::Pack(error) => error.kind(),
             Self::Cancelled(error) => error.kind(),
         }
@@ -150,22 +157,27 @@ impl RepackError {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Repacked {
-    /// The new position of each point, in [0, 1]²; (0, 0) for points that belong to no chart. What stays is where it was, rounded to single
-    /// precision.
+    /// The new position of each point, in [0, 1]² or the squares of further [tiles](PackSettings::tiles); (0, 0) for points that belong to no chart.
+    /// What stays is where it was, rounded to single precision.
     pub uv: Vec<[f32; 2]>,
     /// Number of charts, those that stay included.
     pub charts: usize,
-    /// Area that charts cover, divided by the area of the texture. A chart or group that overlaps itself counts with the sum of its
+    /// Number of tiles in which charts lie, those that stay included.
+    pub tiles: usize,
+    /// Area that charts cover, divided by the area of the tiles in which some lie. A chart or group that overlaps itself counts with the sum of its
     /// triangles' areas, but with no more than the texels it touches; so do all that stay together.
     pub efficiency: f64,
     /// The texel density that all charts that move share, except for tiny ones: texels to a unit of length of the points.
     pub texels_per_unit: f64,
     /// Number of tiny charts or groups, each of which was scaled up to about a texel by a factor of its own.
     pub specks: usize,
+    /// What else the user should know, in sentences: that a [`PackSettings::texel_density`] does not fit.
+    pub warnings: Vec<String>,
 }
 
 /// Moves, turns and scales charts so that they fill the unit square and keep their margin. All charts are scaled by the
-/// same factor, except for those of less than a texel.
+/// same factor, except for those of less than a texel. With several [tiles](PackSettings::tiles) they are spread over these; a group stays together,
+/// and what stays is in the way in every tile that it comes near. With a [density](PackSettings::texel_density) they get that, if it fits.
 ///
 /// Each of the `triangles` names three of the `points`. Triangles with the same number in `chart` make up a chart,
 /// connected or not. Triangles with a negative number are left out, and so are points that belong to no triangle. Charts
@@ -173,7 +185,7 @@ pub struct Repacked {
 /// proportions first. The `rules` say which charts move together, which stay, and how large they become.
 ///
 /// Guaranteed, also after rounding to single precision: two different charts are at least the margin apart, unless they
-/// are of one group or both stay; every chart that moves lies within the texture, at least half a margin or the given distance from its
+/// are of one group or both stay; every chart that moves lies within one tile of the texture, at least half a margin or the given distance from its
 /// border; no chart is mirrored; with [`RepackScale::Uniform`] each chart or group is at least about a texel
 /// large in its longer direction (unless all its points coincide). What stays has the very coordinates that it had, rounded to single
 /// precision. The result is the same for any number of threads. Not guaranteed: the greatest possible density.
@@ -184,7 +196,7 @@ pub struct Repacked {
 ///
 /// # Errors
 /// [`RepackError`]: lengths or indices are wrong, a coordinate is not finite, a point belongs to two charts, a chart to two groups, the
-/// charts do not fit with their margin, or not at the size they have, or the call was cancelled.
+/// charts do not fit with their margin, or not at the size they have, two scales are given, or the call was cancelled.
 pub fn repack(
     points: &[[f64; 2]],
     triangles: &[[i32; 3]],
@@ -205,6 +217,9 @@ pub fn repack(
         RepackScale::Uniform => None,
         RepackScale::Fixed => Some(size[0]),
     };
+    if let (Some(_), Some(density)) = (scale, settings.texel_density) {
+        return Err(RepackError::TwoScales { density });
+    }
     let constraints = Constraints { border_texels: rules.border_texels, scale, obstacles: &obstacles };
     let packed = packing::pack_within(&items, &constraints, settings, progress)?;
     let mut uv = vec![[0.0; 2]; points.len()];
@@ -213,14 +228,21 @@ pub fn repack(
             uv[p] = points[p].map(|x| x as f32);
         }
     }
-    for (island, pose) in islands.iter().zip(&packed.poses) {
+    for (number, island) in islands.iter().enumerate() {
         for (&from, p) in island.source.iter().zip(&island.points) {
-            let texel = pose.texel(*p);
-            uv[from] = [(texel.x / size[0]) as f32, (texel.y / size[1]) as f32];
+            let at = packed.uv(number, *p);
+            uv[from] = [at.x as f32, at.y as f32];
         }
     }
-    let Packed { efficiency, texels_per_unit, specks, .. } = packed;
-    Ok(Repacked { uv, charts: input.charts, efficiency, texels_per_unit, specks })
+    Ok(Repacked {
+        uv,
+        charts: input.charts,
+        tiles: packed.tiles_used,
+        efficiency: packed.efficiency,
+        texels_per_unit: packed.texels_per_unit,
+        specks: packed.specks,
+        warnings: packed.shortfall.iter().map(Shortfall::to_string).collect(),
+    })
 }
 
 /// The arrays of a call, checked, with what moves apart from what stays.
@@ -496,5 +518,42 @@ mod tests {
             panic!("too large")
         };
         assert!(shrunk > 0.45 && shrunk < 0.5, "{shrunk}");
+    }
+
+    #[test]
+    fn a_density_is_in_units_of_the_points_and_told_where_it_does_not_fit() {
+        let at = |tiles: usize, density: f64| {
+            let settings = PackSettings {
+                margin_texels: 2.0,
+                width: 256,
+                height: 128,
+                tiles,
+                texel_density: Some(density),
+                ..PackSettings::default()
+            };
+            repack(&POINTS, &TRIANGLES, &CHART, &RepackRules::default(), &settings, &Progress::new()).expect("they fit")
+        };
+        let exact = at(4, 120.0);
+        assert_eq!((exact.tiles, exact.texels_per_unit, &exact.warnings), (1, 120.0, &Vec::new()));
+        let side = (exact.uv[1][0] - exact.uv[0][0]).hypot(0.5 * (exact.uv[1][1] - exact.uv[0][1])) * 256.0;
+        assert!((side - 120.0).abs() < 1e-3, "{side}");
+        let dense = at(4, 200.0);
+        assert!(dense.texels_per_unit > 120.0 && dense.texels_per_unit < 126.0, "{}", dense.texels_per_unit);
+        assert!(dense.warnings.len() == 1 && dense.warnings[0].contains("200 does not fit"), "{:?}", dense.warnings);
+    }
+
+    #[test]
+    fn groups_stay_in_one_tile_and_two_scales_are_one_too_many() {
+        let settings = PackSettings { margin_texels: 2.0, width: 64, height: 64, tiles: 4, ..PackSettings::default() };
+        let groups = [4, 4, 4, 4, -1, -1];
+        let rules = RepackRules { groups: Some(&groups), ..RepackRules::default() };
+        let pack = |settings: &PackSettings, rules: &RepackRules<'_>| {
+            repack(&POINTS, &TRIANGLES, &[5, 2, 5, 2, 0, 0], rules, settings, &Progress::new())
+        };
+        let found = pack(&settings, &rules).expect("they fit");
+        assert_eq!((found.tiles, &found.uv[..4]), (2, &found.uv[4..8]));
+        let fixed = RepackRules { scale: RepackScale::Fixed, ..rules };
+        let both = PackSettings { texel_density: Some(3.0), ..settings };
+        assert_eq!(pack(&both, &fixed).err(), Some(RepackError::TwoScales { density: 3.0 }));
     }
 }

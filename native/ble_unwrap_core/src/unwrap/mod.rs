@@ -20,7 +20,8 @@ use crate::settings::Settings;
 pub use analysis::Analysis;
 use prepared::Prepared;
 
-/// Unwraps a mesh: cuts it into charts, flattens them under the stretch limit, and packs them into the unit square.
+/// Unwraps a mesh: cuts it into charts, flattens them under the stretch limit, and packs them into the unit square, or several
+/// [tiles](crate::settings::PackSettings::tiles) of that size, each chart into one.
 ///
 /// Guaranteed for every result, checked exactly on the final single-precision values, and proven by its
 /// [`Certificate`](crate::Certificate): each face whose vertices are all finite lies in exactly one chart; no triangle is

@@ -23,6 +23,9 @@
 //! 4. boundary loops of different charts do not touch;
 //! 5. no loop lies in the filled area of another chart (in its holes it may).
 //!
+//! Where the texture has several tiles, every chart must lie within one of these. Nothing else changes: tiles are squares of one plane, and distances
+//! between charts of different tiles count like any others.
+//!
 //! Two charts that share area without their boundaries meeting would have a loop of one inside the
 //! filled area of the other. So 1 to 5 make the whole layout injective.
 
@@ -33,6 +36,7 @@ mod nesting;
 use std::fmt;
 
 use crate::metrics::{GAP_SEARCH_TEXELS, NONE, OwnedSegment, UvMesh, least_gap};
+use crate::packing::Tile;
 use crate::predicates;
 use crate::progress::{Cancelled, Progress};
 
@@ -77,7 +81,8 @@ pub struct Certificate {
     pub charts: usize,
     /// Triangles with a negative label. They take part in no other check, and break no rule by themselves.
     pub unmapped: Defect<u32>,
-    /// Triangles with a corner that is outside the unit square or not finite.
+    /// Triangles with a corner that is outside the unit square or not finite; where the texture has several tiles, outside the tile in which the triangle
+    /// of its chart with the lowest number lies, since a chart must not cross the border of a tile.
     pub out_of_range: Defect<u32>,
     /// Triangles that are not strictly positive: they are turned over or have no area.
     pub flipped: Defect<u32>,
@@ -108,7 +113,10 @@ pub struct Certificate {
 impl fmt::Display for Certificate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let counts = [
-            (self.out_of_range.count, ["triangle outside the texture", "triangles outside the texture"]),
+            (
+                self.out_of_range.count,
+                ["triangle outside the texture or its tile", "triangles outside the texture or their tiles"],
+            ),
             (self.flipped.count, ["flipped triangle", "flipped triangles"]),
             (self.crossings_inside.count, ["crossing of a chart with itself", "crossings of charts with themselves"]),
             (self.crossings_between.count, ["crossing between charts", "crossings between charts"]),
@@ -131,7 +139,7 @@ impl fmt::Display for Certificate {
 }
 
 impl Certificate {
-    /// Whether the layout is proven to be injective, to lie in the unit square and to keep the margin.
+    /// Whether the layout is proven to be injective, to lie in the unit square or its tiles and to keep the margin.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         self.is_injective() && self.keeps_margin()
@@ -144,7 +152,7 @@ impl Certificate {
         self.complete && self.gap_texels >= self.margin_texels
     }
 
-    /// Whether the layout is proven to be injective and to lie in the unit square.
+    /// Whether the layout is proven to be injective and to lie in the unit square or, chart by chart, in its tiles.
     #[must_use]
     pub fn is_injective(&self) -> bool {
         self.complete
@@ -174,6 +182,8 @@ pub(crate) fn verify(mesh: &UvMesh, progress: &Progress) -> Result<Certificate, 
     labels.dedup();
     out.charts = labels.len();
     let mut faulty = vec![false; labels.len()];
+    // The tile of each chart.
+    let mut home: Vec<Option<Tile>> = vec![None; labels.len()];
 
     // The triangles with a chart and finite UVs.
     let mut corners: Vec<[Point; 3]> = Vec::with_capacity(m);
@@ -185,8 +195,13 @@ pub(crate) fn verify(mesh: &UvMesh, progress: &Progress) -> Result<Certificate, 
             continue;
         };
         let c = labels.partition_point(|&l| l < mesh.label(f));
-        let inside = |x: &f32| (0.0..=1.0).contains(x);
-        if !uv.iter().flatten().all(inside) {
+        if home[c].is_none() && uv.iter().flatten().all(|x| x.is_finite()) {
+            // The lower left corner of its box: a triangle may touch the upper and the right border of its tile.
+            let low = [0, 1].map(|k| uv.iter().map(|p| f64::from(p[k])).fold(f64::INFINITY, f64::min));
+            home[c] = Some(Tile::near(low, mesh.texture().tiles));
+        }
+        let tile = home[c].unwrap_or(Tile::near([0.0; 2], 1));
+        if !uv.iter().all(|p| tile.holds(p.map(f64::from), 0.0)) {
             out.out_of_range.add(f as u32);
             faulty[c] = true;
         }

@@ -41,9 +41,14 @@ impl Soup {
     }
 
     fn verify(&self) -> Certificate {
+        self.verify_in(1)
+    }
+
+    /// In a texture of so many tiles.
+    fn verify_in(&self, tiles: usize) -> Certificate {
         let positions = vec![Point3::origin(); self.uv.len()];
         let triangles: Vec<[u32; 3]> = (0..self.chart.len() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
-        let texture = Texture::square(64, 2.0);
+        let texture = Texture { tiles, ..Texture::square(64, 2.0) };
         let mesh =
             UvMesh::new(&positions, &triangles, &self.uv, &triangles, &self.chart, texture).expect("valid arrays");
         verify(&mesh, &Progress::new()).expect("not cancelled")
@@ -190,6 +195,51 @@ fn pieces_range_and_unmapped() {
     assert_eq!(c.out_of_range, Defect { count: 3, first: Some(2) });
     assert_eq!(c.flipped, Defect { count: 1, first: Some(4) });
     assert_eq!(c.faulty_charts, [4, 5]);
+}
+
+#[test]
+fn a_chart_lies_within_one_of_the_tiles() {
+    // The second tile of two, the first of the second row of eleven; each touches the border of its tile all around.
+    for (corner, tiles) in [([0.0, 0.0], 1), ([1.0, 0.0], 2), ([0.0, 1.0], 11), ([9.0, 9.0], 100)] {
+        let mut soup = Soup::default();
+        soup.square(0, corner, 1.0);
+        assert!(soup.verify_in(tiles).is_valid(), "{corner:?}");
+        if tiles > 1 {
+            let c = soup.verify_in(tiles - 1);
+            assert_eq!((c.out_of_range, c.faulty_charts), (Defect { count: 2, first: Some(0) }, vec![0]), "{corner:?}");
+        }
+    }
+    let mut soup = Soup::default();
+    soup.square(3, [0.2, 0.2], 0.5);
+    soup.square(5, [1.2, 0.2], 0.5);
+    assert!(soup.verify_in(4).is_valid());
+    assert_eq!(soup.verify().faulty_charts, [5]);
+    // Across a border, by a triangle that crosses it and by an edge upon it.
+    let mut soup = Soup::default();
+    soup.square(0, [0.75, 0.25], 0.5);
+    let c = soup.verify_in(4);
+    assert_eq!((c.out_of_range.count, c.is_valid()), (2, false));
+    let mut soup = Soup::default();
+    let [low, high] = [0.25, 0.75].map(|y| [0.75, 1.0, 1.25].map(|x| [x, y]));
+    soup.strip(7, &low, &high);
+    let c = soup.verify_in(4);
+    assert_eq!(
+        (c.out_of_range, c.flipped.count, c.faulty_charts.clone()),
+        (Defect { count: 2, first: Some(2) }, 0, vec![7])
+    );
+    assert!(c.to_string().contains("2 triangles outside the texture or their tiles"), "{c}");
+}
+
+#[test]
+fn charts_of_other_tiles_are_apart_as_well() {
+    // A texel of 64 to either side of a border, in both tiles and in only one.
+    for (first, second, gap) in [(63.0, 65.0, 2.0), (63.5, 64.5, 1.0), (64.0, 64.0, 0.0)] {
+        let mut soup = Soup::default();
+        soup.square(0, [0.5, 0.25], first / 64.0 - 0.5);
+        soup.square(1, [second / 64.0, 0.25], 0.5);
+        let c = soup.verify_in(2);
+        assert_eq!((c.gap_texels, c.out_of_range.count, c.is_valid()), (gap, 0, gap >= 2.0));
+    }
 }
 
 #[test]

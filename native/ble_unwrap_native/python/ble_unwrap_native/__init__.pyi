@@ -154,11 +154,21 @@ class _TextureGroup(TypedDict, total=False):
     """Width and height, in texels, of the texture that the UVs are meant for: its proportions and, for the margin, its resolution."""
 
 @type_check_only
+class _TilesGroup(TypedDict, total=False):
+    tiles: int
+    """Over how many tiles of the texture charts may be spread: UDIM 1001, 1002 and so on, ten in a row. No chart crosses the border of a tile."""
+
+@type_check_only
 class _PackingGroup(TypedDict, total=False):
     rotation: Literal["aligned", "any", "quarter", "none"]
     """How charts may be turned when they are packed. "aligned": Charts with straight borders lie along the axes, symmetric ones upright or level, others at any angle. "any": Charts are turned by any angle, which packs tightest. "quarter": Charts are turned by multiples of 90° from how they were flattened, not set upright. "none": Charts stay as they were flattened, at whatever angle that is."""
     quality: Literal["fast", "normal", "high"]
     """How long a dense placement of the charts is searched for. "fast": A fraction of a second for up to some hundred charts. "normal": Up to twice as long; charts turned by any angle are tried at more angles. "high": Ten to twenty times as long, on finer grids."""
+
+@type_check_only
+class _DensityGroup(TypedDict, total=False):
+    texel_density: float | None
+    """How many texels a unit of length gets, in all charts. No more tiles are used than are needed for it; where there are too few, charts get the greatest density that is found, with a warning. None stands for the greatest that is found."""
 
 @type_check_only
 class _UnwrapSettings(
@@ -173,7 +183,9 @@ class _UnwrapSettings(
     _StartGroup,
     _FlatteningGroup,
     _TextureGroup,
+    _TilesGroup,
     _PackingGroup,
+    _DensityGroup,
     total=False,
 ): ...
 
@@ -222,10 +234,10 @@ class _GeodesicDistancesSettings(_CallSettings, _GeodesicsGroup, total=False): .
 class _GraphDistancesSettings(_CallSettings, total=False): ...
 
 @type_check_only
-class _MeasureSettings(_CallSettings, _WeldGroup, _TextureGroup, total=False): ...
+class _MeasureSettings(_CallSettings, _WeldGroup, _TextureGroup, _TilesGroup, total=False): ...
 
 @type_check_only
-class _PackSettings(_CallSettings, _TextureGroup, _PackingGroup, total=False): ...
+class _PackSettings(_CallSettings, _TextureGroup, _TilesGroup, _PackingGroup, _DensityGroup, total=False): ...
 
 # end of what `make settings` makes
 

@@ -84,6 +84,27 @@ fn cube_of_six_charts() {
 }
 
 #[test]
+fn the_share_that_is_used_is_that_of_the_tiles_with_charts() {
+    // Each face of the cube has a sixteenth of a tile, and two of them go into other tiles.
+    let mut cube = Layout::cube();
+    for p in &mut cube.uv[..4] {
+        p[0] += 3.0;
+    }
+    for p in &mut cube.uv[4..8] {
+        p[1] += 1.0;
+    }
+    let tiled = |tiles: usize| cube.measure(Texture { tiles, ..Texture::square(64, 4.0) });
+    let m = tiled(12);
+    assert_eq!((m.tiles, m.charts), (3, 6));
+    assert!(close(m.packing_efficiency, 6.0 / 16.0 / 3.0), "{}", m.packing_efficiency);
+    // In fewer tiles one chart is outside, and the bounding square counts.
+    let m = tiled(10);
+    assert_eq!(m.tiles, 0);
+    assert!(close(m.packing_efficiency, 6.0 / 16.0 / 3.25f64.powi(2)), "{}", m.packing_efficiency);
+    assert_eq!(Layout::cube().measure(Texture::square(64, 4.0)).tiles, 1);
+}
+
+#[test]
 fn scaled_axes() {
     // σ of UV→surface: 2 and 1 at unit density ½.
     let m = Layout::grid(6, |x, y| [0.5 * x, y]).measure(Texture::square(64, 0.0));
@@ -103,7 +124,7 @@ fn shear_and_a_texture_of_other_proportions() {
     let s = (0.5 * (2.25 + (2.25f64 * 2.25 - 4.0).sqrt())).sqrt();
     assert!(close(m.l_infinity, s) && close(m.angle_distortion, 0.5 * (s * s + 1.0 / (s * s))));
     // Made for a texture twice as wide as high: no distortion at all.
-    let wide = Texture { width: 128, height: 64, margin: 0.0 };
+    let wide = Texture { width: 128, height: 64, margin: 0.0, tiles: 1 };
     let m = Layout::grid(5, |x, y| [0.5 * x, y]).measure(wide);
     assert!(close(m.l2, 1.0) && close(m.l_infinity, 1.0) && close(m.packing_efficiency, 0.5), "{m:?}");
 }
