@@ -101,8 +101,9 @@ pub(super) fn tried(
         }
         let under_price = Settings { stretch_limit, ..settings.clone() };
         match trial(cutting, &way, &under_price, &mut rungs, run)? {
-            Verdict::Refused => (),
-            Verdict::BadStart => verdict = Verdict::BadStart,
+            // What unrolls fits as it lies, or from no start.
+            Verdict::BadStart if !cost::has_to_unroll(stretch_limit) => verdict = Verdict::BadStart,
+            Verdict::Refused | Verdict::BadStart => (),
             Verdict::Charts(charts) => {
                 if price.is_none_or(|price| price.is_worth(&old, &charts)) {
                     return Ok((Verdict::Charts(charts), rungs));

@@ -7,10 +7,10 @@ use nalgebra::Point3;
 use crate::atlas::Atlas;
 use crate::cache::{Fingerprint, Kind, Run};
 use crate::clock::Clock;
+use crate::cutting::AtVertices;
 use crate::error::UnwrapError;
 use crate::mesh::{self, ConditionOptions, FaceId, Groups, MeshInput, Surface};
 use crate::progress::{Cancelled, Progress, Stage};
-use crate::cutting::AtVertices;
 use crate::settings::Settings;
 use crate::{cutting, layout, visibility};
 
@@ -34,8 +34,7 @@ impl Prepared {
     ) -> Result<Self, UnwrapError> {
         let surface = mesh::canonical(mesh::condition(input, conditioning, progress)?, progress)?;
         let (label, count) = surface.mesh.components();
-        let painted =
-            input.seam_weights.map(|weights| surface.vertex.iter().map(|&v| weights[v as usize]).collect());
+        let painted = input.seam_weights.map(|weights| surface.vertex.iter().map(|&v| weights[v as usize]).collect());
         Ok(Self { components: Groups::by_label(&label, count, FaceId::new), painted, surface })
     }
 
