@@ -98,8 +98,7 @@ def gather(
 
     `only_selected` and `by_uv` as in `chosen_faces`; they matter for objects in edit mode. `target` is the UV map that
     will be written, `sharp_angle` is in degrees, `seams_away` and `seams_here` name what is painted (`painted`). Raises
-    `MeshError` where the map cannot be written, or where pinned
-    UVs would be moved and may not be.
+    `MeshError` where the map cannot be written, or where pinned UVs would be moved and may not be.
     """
     warnings, parts, blocks, reasons, found = [], [], [], [], set()
     vertex_base = corner_base = face_base = 0
@@ -154,7 +153,7 @@ def gather(
         raise reasons[0] if reasons else NothingToUnwrap("There are no faces to unwrap")
     if max(vertex_base, corner_base) > np.iinfo(np.int32).max:
         raise MeshError("The selection is too large: more than two thousand million corners")
-    if missing := [name for name in (seams_away, seams_here) if name and name not in found]:
+    if missing := [name for name in dict.fromkeys((seams_away, seams_here)) if name and name not in found]:
         names = " or ".join(f'"{name}"' for name in missing)
         warnings.append(f"There is no vertex group and no attribute of one number a point named {names}")
     positions, corner_vertices, sizes, triangles, weights, *marks = (

@@ -1,4 +1,4 @@
-"""Where an artist has painted that seams are to keep away from, or are welcome."""
+"""Where an artist has painted that seams are to keep away, or are welcome."""
 
 import bmesh
 import numpy as np
@@ -11,9 +11,9 @@ FULL_WEIGHT = 10.0  # at full weight a seam counts for so many times its length,
 def seam_weights(obj, away, here):
     """What a seam at each vertex of a mesh object counts for, (n,) float32, and those of the two names that it has.
 
-    `away` and `here` name a vertex group, or an attribute of one number a point, whose values from 0 to 1 say where seams
-    are to keep away, and where they are welcome; without a name, or where the object has neither, nowhere. Of a mesh in
-    edit mode, which has been brought up to date.
+    `away` and `here` name a vertex group, or an attribute of one number a point, whose values from 0 to 1 say where
+    seams are to keep away, and where they are welcome; without a name, or where the object has neither, nowhere. A mesh
+    in edit mode has to be up to date.
     """
     exponents, found = np.zeros(len(obj.data.vertices), np.float32), set()
     for name, sign in ((away, 1.0), (here, -1.0)):
@@ -34,11 +34,15 @@ def _values(obj, name):
             for element in vertex.groups:
                 if element.group == group.index:
                     values[vertex.index] = element.weight
+                    break
         return values
     if mesh.is_editmode:
         vertices = bmesh.from_edit_mesh(mesh).verts
         layer = vertices.layers.float.get(name)
-        return None if layer is None else np.fromiter((v[layer] for v in vertices), np.float32, len(vertices))
+        # Where another object edits the mesh, it may have other vertices there.
+        if layer is None or len(vertices) != len(mesh.vertices):
+            return None
+        return np.fromiter((v[layer] for v in vertices), np.float32, len(vertices))
     attribute = mesh.attributes.get(name)
     if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "FLOAT"):
         return None

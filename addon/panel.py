@@ -8,7 +8,7 @@ from . import last_result, properties, targets
 
 CATEGORY = "BLE Unwrap"
 STATUS_ICONS = {"HEAD": "DOT", "OK": "CHECKMARK", "BAD": "ERROR", "WARN": "INFO", "INFO": "BLANK1"}
-PAINTED = ("seams_away", "seams_here")  # settings that name a vertex group
+PAINTED = ("seams_away", "seams_here")  # settings that name a vertex group or an attribute
 LINE_CHARACTERS = 36  # of a line of the panel at its usual width
 
 
@@ -20,7 +20,7 @@ def draw_settings(layout, context, names):
     for name in panel_settings(settings, context, names):
         obj = context.active_object
         if name in PAINTED and obj is not None and obj.type == "MESH":
-            column.prop_search(settings, name, obj, "vertex_groups")
+            column.prop_search(settings, name, obj, "vertex_groups", results_are_suggestions=True)
         else:
             column.prop(settings, name)
 

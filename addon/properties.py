@@ -120,16 +120,16 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     seams_away: StringProperty(
         name="Keep Seams Away",
         description=(
-            "A vertex group, or an attribute of one number a point, that says where seams are to keep away: at a weight "
-            "of 1 a seam counts for ten times its length"
+            "A vertex group, or an attribute of one number a point, that says where seams are to keep away: at a "
+            "weight of 1 a seam counts for ten times its length"
         ),
         default="",
     )
     seams_here: StringProperty(
         name="Seams Here",
         description=(
-            "A vertex group, or an attribute of one number a point, that says where seams are welcome: at a weight of 1 "
-            "a seam counts for a tenth of its length"
+            "A vertex group, or an attribute of one number a point, that says where seams are welcome: at a weight of "
+            "1 a seam counts for a tenth of its length"
         ),
         default="",
     )

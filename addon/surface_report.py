@@ -57,7 +57,7 @@ def _used_text(measured):
     of = "the texture" if tiles == 1 else f"{tiles} tiles"
     text = f"{100 * float(measured.get('packing_efficiency') or 0):.1f}% of {of} used"
     density = measured.get("texels_per_unit")
-    return f"{text}, {density:.4g} px per unit of length" if density else text
+    return f"{text}, {float(f'{density:.4g}'):.10g} px per unit of length" if density else text
 
 
 def _overlaps_text(measured):

@@ -107,7 +107,7 @@ def test_like_parts_that_are_painted_differently_are_no_copies(ball):
     positions, corners, offsets = ball
     count = len(positions)
     both = (
-        np.concatenate([positions, positions + (5, 0, 0)]),
+        np.concatenate([positions, positions + np.array([5, 0, 0])]),
         np.concatenate([corners, corners + count]),
         np.concatenate([offsets, offsets[1:] + offsets[-1]]),
     )
@@ -127,7 +127,9 @@ def test_wrong_seam_weights_are_named(square):
     with pytest.raises(native.InvalidMeshError, match="3 seam weights, but 4 vertices"):
         native.unwrap(*square, seam_weights=np.ones(3))
     for wrong in (0.0, -1.0, 1001.0, np.nan):
-        with pytest.raises(native.InvalidMeshError, match="seam weight of vertex 2 is not a number from 0.001 to 1000"):
+        with pytest.raises(
+            native.InvalidMeshError, match=r"seam weight of vertex 2 is not a number from 0\.001 to 1000"
+        ):
             native.unwrap(*square, seam_weights=np.array([1.0, 1.0, wrong, 1.0]))
 
 

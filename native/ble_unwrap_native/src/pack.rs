@@ -59,7 +59,7 @@ impl PackedCharts {
 ///     Triangles whose chart or group stays where it is. The points of what stays are UVs, and are returned as they are, in single precision.
 ///     They may lie outside the texture.
 /// border_margin : float, optional
-///     Least distance of charts that move to the border of the texture, in texels; half of ``margin`` if absent.
+///     Least distance of charts that move to the border of the texture, in texels; half of ``margin`` if absent, and at least that with several ``tiles``.
 /// scale : {"uniform", "fixed"}
 ///     ``"uniform"``: all charts are scaled by the same factor, the greatest found. ``"fixed"``: charts keep their size; a unit of the points is
 ///     the width of the texture, along both sides.
@@ -77,7 +77,7 @@ impl PackedCharts {
 ///     Over how many tiles charts may be spread, 1 to 100. Tile k, from 0, is the square of UV with its lower left corner at (k mod 10, k // 10), which
 ///     is also called UDIM 1001 + k. No chart crosses the border of a tile, and a group stays in one; obstacles are in the way where they are.
 /// texel_density : float or None
-///     Texels to a unit of length of ``points``, for all charts. They get exactly that, in no more tiles than needed; where it does not fit into
+///     Texels to a unit of length of ``points``, for all charts larger than a texel, in as few tiles as are found to do; where it does not fit into
 ///     ``tiles`` tiles, they get the greatest density that is found, and ``warnings`` says so. None for the greatest that is found.
 /// threads : int
 ///     Threads to work with; 0 for as many as the machine has. The result does not depend on it.

@@ -153,7 +153,7 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 ///     Edges that borders of charts follow where a border is needed, such as sharp edges and borders of materials.
 /// seam_weights : (n,) float32 or float64, optional
 ///     What a seam at each vertex counts for, as a multiple of its length, 0.001 to 1000: more than 1 where seams are to keep away, less where
-///     they are welcome. A surface that is symmetric stays so: there a vertex and its mirror image count for their geometric mean.
+///     they are welcome. Vertices that are welded count for their geometric mean, and so do a vertex and its mirror image where seams are mirrored.
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
 #[doc = include_str!("settings.txt")]
@@ -190,7 +190,8 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 /// or the shortest seams.
 ///
 /// With several ``tiles``, charts are spread over them at one density, and each lies within one: tile k, from 0, is the square of UV with its lower left
-/// corner at (k mod 10, k // 10). With a ``texel_density`` no more tiles are used than needed; where it does not fit, a warning says what did.
+/// corner at (k mod 10, k // 10). A ``texel_density`` is that of all charts larger than a texel, times a factor of each where ``chart_scale`` is
+/// "stretch"; where it does not fit, a warning says what did.
 ///
 /// ``limit_over="atlas"`` bounds the root of the area-weighted mean of the charts' squared L2 stretch, as in UVAtlas.
 ///

@@ -34,13 +34,10 @@ pub(super) struct Alike {
     likeness: Likeness,
 }
 
-/// A component as a patch of itself, and what is known of its vertices.
+/// A component as a patch of itself, and where its vertices are beside those of others.
 pub(super) struct Placed {
     pub(super) patch: Patch,
-    /// Where they are beside those of others.
     pub(super) positions: Vec<Point3<f64>>,
-    /// What a seam there counts for by the wish of the user, where there is one.
-    pub(super) painted: Option<Vec<f32>>,
 }
 
 /// For each component the one before it that it is like, if any. Where the object has a mirror plane, that of one of its largest
@@ -87,7 +84,7 @@ fn plane(
     let mut largest: Vec<usize> = (0..components.len()).collect();
     largest.sort_by_key(|&component| Reverse(components.group(component).len()));
     for &component in largest.iter().take(MOST_PLANES) {
-        let Placed { patch, positions, .. } = placed(component);
+        let Placed { patch, positions } = placed(component);
         let mirror = mesh::mirror(&patch.mesh, &patch.polygon, progress)?;
         if let Some(plane) = mirror.and_then(|mirror| mirror.plane(&patch.mesh, &positions)) {
             return Ok(Some(plane));
@@ -145,7 +142,6 @@ fn likeness_in(
     let most = MISPLACED * here.extent();
     let is_image = |v: VertexId, w: VertexId| {
         (plane.mirrored(here.positions[v.index()]) - there.positions[w.index()]).norm() <= most
-            && here.is_painted_as(v, there, w)
     };
     match (here.shape(), there.shape()) {
         (Some(a), Some(b)) => a.likeness(&b, true, is_image, progress),
@@ -157,7 +153,7 @@ fn likeness_in(
 fn likeness(here: &Placed, there: &Placed, progress: &Progress) -> Result<Option<Likeness>, Cancelled> {
     let (Some(a), Some(b)) = (here.shape(), there.shape()) else { return Ok(None) };
     for is_mirrored in [true, false] {
-        let found = a.likeness(&b, is_mirrored, |v, w| here.is_painted_as(v, there, w), progress)?;
+        let found = a.likeness(&b, is_mirrored, |_, _| true, progress)?;
         if found.is_some() {
             return Ok(found);
         }
@@ -167,15 +163,7 @@ fn likeness(here: &Placed, there: &Placed, progress: &Progress) -> Result<Option
 
 impl Placed {
     fn shape(&self) -> Option<Shape<'_>> {
-        Shape::new(&self.patch.mesh, &self.patch.polygon)
-    }
-
-    /// Whether the user wishes the same of seams at a vertex as at one of another component.
-    fn is_painted_as(&self, v: VertexId, other: &Self, w: VertexId) -> bool {
-        match (&self.painted, &other.painted) {
-            (Some(here), Some(there)) => here[v.index()] == there[w.index()],
-            _ => true,
-        }
+        Shape::new(&self.patch.mesh, &self.patch.polygon).map(Shape::telling_seams)
     }
 
     /// The mean of its vertices.

@@ -18,8 +18,6 @@ use crate::charts::{Chart, Patch};
 use crate::mesh::{FaceId, Groups, HalfedgeId, TriMesh, VertexId, measure};
 use crate::settings::Settings;
 
-use super::AtVertices;
-
 /// A chart costs as much as a seam of so many √A. It is the rate at which the search traded charts for seam when that was still spread
 /// over several rules; no other has been measured since.
 pub(super) const CHART: f64 = 1.5;
@@ -57,28 +55,16 @@ const GOOD_FILL: f64 = 0.6;
 /// A cut in the middle of a strip comes to 0.5 to 0.6.
 const LEAST_GAIN: f64 = 0.9;
 
-/// A mesh on which seams are the dearer the more they can be seen, and as much dearer or cheaper as the user has painted them.
+/// A mesh on which seams are the dearer the more they can be seen, by the power [`Settings::hide_seams`] of the visibility: each component by
+/// itself, so that in the mean over its surface a border counts for its length, times what it counted for before.
 pub(super) fn weighed(
     mesh: &Arc<TriMesh>,
     components: &Groups<FaceId>,
-    vertices: &AtVertices<'_>,
+    visibility: &[f32],
     settings: &Settings,
 ) -> Arc<TriMesh> {
-    let by_sight = vertices.visibility.map(|seen| weights_by_sight(mesh, components, seen, settings.hide_seams));
-    let weights = match (by_sight, vertices.painted) {
-        (None, None) => return Arc::clone(mesh),
-        (Some(weights), None) => weights,
-        (None, Some(painted)) => painted.to_vec(),
-        (Some(weights), Some(painted)) => weights.iter().zip(painted).map(|(weight, wish)| weight * wish).collect(),
-    };
-    Arc::new(TriMesh::clone(mesh).with_seam_weights(weights))
-}
-
-/// For each vertex what a seam there counts for, by a power of its visibility: each component by itself, so that in the mean over its surface a
-/// border counts for its length.
-fn weights_by_sight(mesh: &TriMesh, components: &Groups<FaceId>, visibility: &[f32], power: f64) -> Vec<f32> {
-    let mut seam_weight = vec![1.0; mesh.vertex_count()];
-    let seen = |v: VertexId| f64::from(visibility[v.index()]).powf(power);
+    let mut seam_weight: Vec<f32> = mesh.vertices().map(|v| mesh.seam_weight(v)).collect();
+    let seen = |v: VertexId| f64::from(visibility[v.index()]).powf(settings.hide_seams);
     for faces in components.iter() {
         let (mut sum, mut total) = (0.0, 0.0);
         for &f in faces {
@@ -92,11 +78,11 @@ fn weights_by_sight(mesh: &TriMesh, components: &Groups<FaceId>, visibility: &[f
             for v in faces.iter().flat_map(|f| mesh.triangle(*f)) {
                 #[expect(clippy::cast_possible_truncation, reason = "a weight needs no more digits")]
                 let weight = (seen(v) / mean).max(LEAST_WEIGHT) as f32;
-                seam_weight[v.index()] = weight;
+                seam_weight[v.index()] = mesh.seam_weight(v) * weight;
             }
         }
     }
-    seam_weight
+    Arc::new(TriMesh::clone(mesh).with_seam_weights(seam_weight))
 }
 
 /// The prices on one surface.
@@ -324,11 +310,8 @@ mod tests {
         let mesh = Arc::new(test_surfaces::grid(8, 8, [1.0, 1.0], 0.0));
         let components = Groups::by_label(&vec![0; mesh.face_count()], 1, FaceId::new);
         let visibility: Vec<f32> = mesh.positions().iter().map(|p| if p.x < 0.5 { 0.4 } else { 1.0 }).collect();
-        let with = |visibility: &[f32], painted: Option<&[f32]>, power: f64| {
-            let vertices = AtVertices { positions: mesh.positions(), visibility: Some(visibility), painted };
-            weighed(&mesh, &components, &vertices, &Settings { hide_seams: power, ..Settings::default() })
-        };
-        let weighed_by = |power: f64| with(&visibility, None, power);
+        let by = |power: f64| Settings { hide_seams: power, ..Settings::default() };
+        let weighed_by = |power: f64| weighed(&mesh, &components, &visibility, &by(power));
         let cost = |mesh: &TriMesh, is_there: fn(f64) -> bool| {
             let middle = |h| 0.5 * (mesh.position(mesh.from(h)).x + mesh.position(mesh.to(h)).x);
             let costs: Vec<f64> = mesh.edges().filter(|&h| is_there(middle(h))).map(|h| mesh.border_cost(h)).collect();
@@ -348,11 +331,12 @@ mod tests {
         let faces: Vec<FaceId> = steep.faces().skip(5).step_by(2).collect();
         let (part, source) = steep.submesh(&faces, |_| false);
         assert_eq!(part.seam_weights_of(&part.vertices().collect::<Vec<_>>()), steep.seam_weights_of(&source));
-        let unseen = with(&vec![0.0; mesh.vertex_count()], None, 2.0);
+        let unseen = weighed(&mesh, &components, &vec![0.0; mesh.vertex_count()], &Settings::default());
         assert!(unseen.edges().all(|h| unseen.border_cost(h) == 1.0));
         // What is painted counts besides, and nothing is made up for elsewhere.
         let wishes: Vec<f32> = mesh.positions().iter().map(|p| if p.y < 0.5 { 10.0 } else { 1.0 }).collect();
-        let (plain, painted) = (weighed_by(2.0), with(&visibility, Some(&wishes), 2.0));
+        let painted = Arc::new(TriMesh::clone(&mesh).with_seam_weights(wishes.clone()));
+        let (plain, painted) = (weighed_by(2.0), weighed(&painted, &components, &visibility, &by(2.0)));
         for h in mesh.edges() {
             let wish = [mesh.from(h), mesh.to(h)].map(|v| f64::from(wishes[v.index()]));
             if wish[0] == wish[1] {

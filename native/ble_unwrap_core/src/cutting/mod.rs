@@ -54,31 +54,27 @@ pub(crate) use touch_up::touch_up;
 /// The charts of a component, and how they came about.
 type Made = (Vec<Chart>, Rungs);
 
-/// What is known of each vertex of a surface besides its mesh.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct AtVertices<'a> {
-    /// Where the vertices of different pieces are beside each other, in units of the mesh.
-    pub(crate) positions: &'a [Point3<f64>],
-    /// How far each can be seen, where that matters.
-    pub(crate) visibility: Option<&'a [f32]>,
-    /// What a seam there counts for by the wish of the user, where there is one.
-    pub(crate) painted: Option<&'a [f32]>,
-}
-
 /// Cuts a surface into charts under the stretch limit of `settings`, sorted by lowest face. `components` holds the faces of
-/// each connected piece, ascending.
+/// each connected piece, ascending, `positions` says where the vertices of different pieces are beside each other, in units of the mesh,
+/// and `visibility` how far each vertex can be seen, where that matters.
 ///
 /// # Errors
 /// The caller cancelled, or there is not enough memory.
 pub(crate) fn cut(
     surface: &Surface,
     components: &Groups<FaceId>,
-    vertices: &AtVertices<'_>,
+    positions: &[Point3<f64>],
+    visibility: Option<&[f32]>,
     settings: &Settings,
     run: &Run<'_>,
 ) -> Result<Made, Cancelled> {
-    let mesh = &cost::weighed(&surface.mesh, components, vertices, settings);
+    let mesh = &match visibility {
+        Some(visibility) => cost::weighed(&surface.mesh, components, visibility, settings),
+        None => Arc::clone(&surface.mesh),
+    };
     let polygon = &surface.polygon;
+    // Of what counts for seams, likeness is about what the user wishes, not about what can be seen.
+    let unweighed_patch_of = |component: usize| whole(&surface.mesh, polygon, components.group(component));
     let charted = Charted::new(run.progress, mesh.face_count());
     let patch_of = |component: usize| whole(mesh, polygon, components.group(component));
     let of_component = |component: usize| {
@@ -86,18 +82,14 @@ pub(crate) fn cut(
         charts_of(&patch, components.group(component), settings, &charted, run)
     };
     let placed = |component: usize| {
-        let patch = patch_of(component);
-        let mut positions = vec![Point3::origin(); patch.mesh.vertex_count()];
-        let mut painted = vertices.painted.map(|_| vec![1.0; patch.mesh.vertex_count()]);
+        let patch = unweighed_patch_of(component);
+        let mut place = vec![Point3::origin(); patch.mesh.vertex_count()];
         for (f, local) in components.group(component).iter().zip(patch.mesh.triangles()) {
             for (v, local) in mesh.triangle(*f).iter().zip(local) {
-                positions[local.index()] = vertices.positions[v.index()];
-                if let (Some(painted), Some(weights)) = (&mut painted, vertices.painted) {
-                    painted[local.index()] = weights[v.index()];
-                }
+                place[local.index()] = positions[v.index()];
             }
         }
-        Placed { patch, positions, painted }
+        Placed { patch, positions: place }
     };
     let likes = alike(components, &placed, settings, run.progress)?;
     // The largest first, so that no long one starts last.

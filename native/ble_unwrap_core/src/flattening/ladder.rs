@@ -31,8 +31,8 @@ const MOST_FOLDED: f64 = 0.25;
 /// Charts sewn together that turn over more of the surface than this do not fit: of 1,200 such starts on a CAD part of 61,000 slivers, a scan of
 /// 871,000 faces and a dozen models 30 ended under the limit, after half of the time that was spent on joining.
 const MOST_FOLDED_SEWN: f64 = 1e-3;
-/// So it is with charts that lie as they did on a coarser mesh, but for folds that are as small as its faces: of 70 starts above this share on the CAD
-/// part and a scan of 871,000 faces 2 ended under the limit.
+/// The same of charts that lie already, most of them as on a coarser mesh, whose faces may fold in small: of 70 such starts on the CAD part and the
+/// scan 2 ended under the limit.
 const MOST_FOLDED_LYING: f64 = 0.01;
 /// A start without flips that is stretched more than this is not worth minimising: of the trials on a model
 /// with many holes, where starts are worst, none that began above 3 came under an L2 of 1.1; this leaves room.

@@ -209,7 +209,7 @@ fn uncollapsed(mut surface: Surface, collapsed: Collapsed) -> Surface {
 }
 
 /// The surface of polygons none of whose sides are to be collapsed, in the frame's unit, with `defects` and those found.
-/// Of `input`, which holds the same polygons, only triangles, seams and guides are looked at.
+/// Of `input`, which holds the same polygons, only triangles, seams, guides and weights of seams are looked at.
 fn surface_of(
     polygons: &Polygons<'_>,
     mapped: &[bool],
@@ -256,8 +256,9 @@ fn surface_of(
     let (mesh, source) = TriMesh::from_glued(&assembled.corner, assembled.twin, |corner| {
         points[polygons.vertex(corner as usize)] / unit
     });
-    let mesh = mesh.with_guides(guides);
     let vertex: Vec<u32> = source.iter().map(|&c| polygons.vertex(c as usize) as u32).collect();
+    let weights = input.seam_weights.map(|weights| seam_weights(weights, representative, &vertex));
+    let mesh = mesh.with_guides(guides).with_seam_weights(weights.unwrap_or_default());
     progress.check()?;
 
     let severed = severed_vertices(polygons, mapped, representative, &severed, &mut defects);
@@ -414,6 +415,23 @@ fn guide_marks(
             && keys.binary_search(&key(ends.map(|c| polygons.vertex(assembled.corner[c.index()] as usize)))).is_ok()
     };
     (0..assembled.corner.len()).map(is_guide).collect()
+}
+
+/// What a seam at each vertex of the surface counts for, given what it counts for at those of the input: where some are welded, the geometric mean of
+/// all of these. O(n).
+fn seam_weights(weights: &[f32], representative: &[u32], vertex: &[u32]) -> Vec<f32> {
+    let mut welded = vec![(0.0, 0.0); weights.len()];
+    for (weight, r) in weights.iter().zip(representative) {
+        let (sum, count) = &mut welded[*r as usize];
+        *sum += f64::from(*weight).ln();
+        *count += 1.0;
+    }
+    let mean = |v: &u32| {
+        let (sum, count) = welded[representative[*v as usize] as usize];
+        // The very number that was given where nothing was welded.
+        if count > 1.0 { f64::exp(sum / count) as f32 } else { weights[*v as usize] }
+    };
+    vertex.iter().map(mean).collect()
 }
 
 /// Area of each polygon and of all, in the frame's unit. Counts the triangles that have none.

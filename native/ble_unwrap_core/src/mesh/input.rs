@@ -28,7 +28,7 @@ pub struct MeshInput<'a> {
     pub guides: &'a [[i32; 2]],
     /// What a seam at each vertex counts for, as a multiple of its length, from [`LEAST_SEAM_WEIGHT`](Self::LEAST_SEAM_WEIGHT) to
     /// [`LARGEST_SEAM_WEIGHT`](Self::LARGEST_SEAM_WEIGHT): more than 1 where seams are to keep away, less where they are welcome. Where absent, 1
-    /// everywhere. Of vertices that are welded, one counts. Where seams are mirrored, a vertex and its mirror image count for their geometric mean.
+    /// everywhere. Vertices that are welded count for their geometric mean, and so do a vertex and its mirror image where seams are mirrored.
     pub seam_weights: Option<&'a [f32]>,
 }
 

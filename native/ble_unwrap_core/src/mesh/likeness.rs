@@ -51,6 +51,8 @@ pub(crate) struct Shape<'a> {
     pub(super) tolerance: f64,
     /// A side that leaves the vertex farthest from the middle.
     start: HalfedgeId,
+    /// Whether only what counts the same for seams looks alike.
+    tells_seams: bool,
 }
 
 impl<'a> Shape<'a> {
@@ -61,9 +63,14 @@ impl<'a> Shape<'a> {
         let radius: Vec<f64> = points.iter().map(|p| (p - middle).norm()).collect();
         let farthest = mesh.vertices().max_by(|v, w| radius[v.index()].total_cmp(&radius[w.index()]).then(w.cmp(v)))?;
         let tolerance = TOLERANCE * 2.0 * radius[farthest.index()];
-        let mut shape = Self { mesh, polygon, radius, tolerance, start: HalfedgeId::NONE };
+        let mut shape = Self { mesh, polygon, radius, tolerance, start: HalfedgeId::NONE, tells_seams: false };
         shape.start = mesh.outgoing(farthest).find(|&h| !shape.is_diagonal(h))?;
         Some(shape)
+    }
+
+    /// The same, alike only where seams count for the same.
+    pub(crate) fn telling_seams(self) -> Self {
+        Self { tells_seams: true, ..self }
     }
 
     pub(super) fn is_diagonal(&self, h: HalfedgeId) -> bool {
@@ -161,19 +168,20 @@ struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
-    /// Whether one side may be the image of another: as long, and its ends as far from the middle.
+    /// Whether one side may be the image of another: as long, and its ends as far from the middle and as good for seams, where that is told.
     fn looks_alike(&self, here: HalfedgeId, there: HalfedgeId) -> bool {
         let (a, b) = (self.here, self.there);
         let alike = |x: f64, y: f64| (x - y).abs() <= a.tolerance;
-        let ends =
-            |shape: &Shape<'_>, h| [shape.mesh.from(h), shape.mesh.to(h)].map(|v: VertexId| shape.radius[v.index()]);
-        let [from, to] = ends(a, here);
-        let [mut other_from, mut other_to] = ends(b, there);
+        let ends = [a.mesh.from(here), a.mesh.to(here)];
+        let mut other_ends = [b.mesh.from(there), b.mesh.to(there)];
         if self.is_mirrored {
-            std::mem::swap(&mut other_from, &mut other_to);
+            other_ends.reverse();
         }
-        alike(from, other_from)
-            && alike(to, other_to)
+        let are_alike = |(v, w): (VertexId, VertexId)| {
+            alike(a.radius[v.index()], b.radius[w.index()])
+                && (!a.tells_seams || a.mesh.seam_weight(v) == b.mesh.seam_weight(w))
+        };
+        ends.into_iter().zip(other_ends).all(are_alike)
             && alike(a.mesh.edge_length(here), b.mesh.edge_length(there))
             && a.mesh.is_guide(here) == b.mesh.is_guide(there)
             && a.mesh.is_boundary(here) == b.mesh.is_boundary(there)
@@ -270,6 +278,22 @@ mod tests {
                 assert!((original.0.edge_length(h) - copy.0.edge_length(image)).abs() < 1e-9);
             }
         }
+    }
+
+    #[test]
+    fn what_is_painted_differently_is_not_alike_where_that_is_told() {
+        let original = sheet(|p| p, false);
+        let painted = |mesh: &TriMesh| {
+            let weights = mesh.positions().iter().map(|p| if p.x > 2.0 { 10.0 } else { 1.0 }).collect();
+            mesh.clone().with_seam_weights(weights)
+        };
+        let copy = (painted(&original.0), original.1.clone());
+        let telling = |a: &(TriMesh, Vec<u32>), b: &(TriMesh, Vec<u32>)| {
+            let [a, b] = [a, b].map(|(mesh, polygon)| Shape::new(mesh, polygon).expect("it has sides").telling_seams());
+            a.likeness(&b, false, |_, _| true, &Progress::new()).expect("not cancelled")
+        };
+        assert!(likeness(&original, &copy, false).is_some());
+        assert!(telling(&original, &copy).is_none() && telling(&copy, &copy).is_some());
     }
 
     #[test]

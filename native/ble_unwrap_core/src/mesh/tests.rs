@@ -330,6 +330,25 @@ fn seams_cut_welded_vertices_too() {
 }
 
 #[test]
+fn seams_at_welded_vertices_count_for_the_geometric_mean() {
+    let left = grid(4, 8, |u, v| [u, v, 0.0]);
+    let mesh = left.joined(&grid(4, 8, |u, v| [u + 1.0, v, 0.0]));
+    let flat = mesh.flat();
+    let weights: Vec<f32> = (0..90).map(|v| if v < 45 { 4.0 } else { 9.0 }).collect();
+    for (weld, on_border) in [(true, 6.0), (false, 0.0)] {
+        let painted = MeshInput { seam_weights: Some(&weights), ..input(&mesh, &flat) };
+        let surface = run(&painted, weld).expect("valid");
+        let m = &surface.mesh;
+        for v in m.vertices() {
+            let input = surface.vertex[v.index()] as usize;
+            let is_welded = weld && mesh.positions[input][0] == 1.0;
+            let expected = if is_welded { on_border } else { weights[input] };
+            assert!((m.seam_weight(v) - expected).abs() < 1e-6, "{} instead of {expected}", m.seam_weight(v));
+        }
+    }
+}
+
+#[test]
 fn guides_mark_both_sides_of_edges_and_nothing_else() {
     let left = grid(4, 8, |u, v| [u, v, 0.0]);
     let mesh = left.joined(&grid(4, 8, |u, v| [u + 1.0, v, 0.0]));

@@ -395,6 +395,13 @@ impl TriMesh {
         Self { seam_weight, ..self }
     }
 
+    /// What a border counts for its length at a vertex.
+    #[inline]
+    #[must_use]
+    pub(crate) fn seam_weight(&self, v: VertexId) -> f32 {
+        self.seam_weight.get(v.index()).copied().unwrap_or(1.0)
+    }
+
     /// What a border counts for its length at some vertices, for a mesh made of them.
     pub(crate) fn seam_weights_of(&self, vertices: &[VertexId]) -> Vec<f32> {
         if self.seam_weight.is_empty() {
@@ -433,7 +440,7 @@ impl TriMesh {
     #[must_use]
     pub(crate) fn border_cost(&self, h: HalfedgeId) -> f64 {
         let guide = if self.is_guide(h) { GUIDE_COST } else { 1.0 };
-        let at = |v: VertexId| self.seam_weight.get(v.index()).map_or(1.0, |&seam_weight| f64::from(seam_weight));
+        let at = |v: VertexId| f64::from(self.seam_weight(v));
         guide * 0.5 * (at(self.from(h)) + at(self.to(h)))
     }
 

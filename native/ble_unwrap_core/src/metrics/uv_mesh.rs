@@ -28,7 +28,7 @@ impl Texture {
     #[must_use]
     pub(crate) fn of(packing: &PackSettings) -> Self {
         let PackSettings { width, height, margin_texels: margin, tiles, .. } = *packing;
-        Self { width, height, margin, tiles }
+        Self { width, height, margin, tiles: tiles.clamp(1, PackSettings::MOST_TILES) }
     }
 
     /// Factors that turn UV into texels; a side of no texels counts as one.

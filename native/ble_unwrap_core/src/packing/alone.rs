@@ -7,7 +7,7 @@ use super::outline::Outline;
 use super::placement::{Dense, Place};
 use super::pose::{aligned_turn, symmetric_turn, turn_alone};
 use super::raster::rasterise;
-use super::shape::SAFETY_TEXELS;
+use super::shape::{SAFETY_TEXELS, Scale};
 use super::{PackSettings, Pose, Rotation};
 
 /// Cells along the longer side of the raster that tells how much of the texture the chart touches.
@@ -41,7 +41,9 @@ pub(super) fn alone(outlines: &[Outline], which: usize, grid: Grid, most: f64, s
         Rotation::Quarter => upright_or_lying([1.0, 0.0]),
     };
     let Fit { middle, scale } = fit(outline, turn, room);
-    let scale = scale.min(most * outline.unit());
+    let wanted = Scale::new(outline, most, 1.0);
+    let scale = scale.min(wanted.cells);
+    let is_speck = wanted.is_speck && scale >= wanted.cells;
     // The middle of the chart's box to the middle of the grid.
     let offset = |k: usize| 0.5 * inner[k] - scale * middle[k];
     let pose = Pose {
@@ -53,10 +55,9 @@ pub(super) fn alone(outlines: &[Outline], which: usize, grid: Grid, most: f64, s
     };
     let cell = inner[0].max(inner[1]) / RASTER;
     let raster = rasterise(outline, turn, scale / cell, SAFETY_TEXELS / cell).mask;
-    let place =
-        Place { pose: grid.frame_to_texture(pose), touched: raster.count() as f64 * cell * cell, is_speck: false };
+    let place = Place { pose: grid.frame_to_texture(pose), touched: raster.count() as f64 * cell * cell, is_speck };
     let places = (0..outlines.len()).map(|i| (i == which).then_some(place)).collect();
-    Dense { places, density: pose.scale }
+    Dense { places, density: if is_speck { most } else { pose.scale } }
 }
 
 /// The box of a turned outline.

@@ -145,8 +145,9 @@ pub struct PackSettings {
     /// Over how many tiles of the texture charts may be spread, 1 to [`PackSettings::MOST_TILES`], each as large as `width` by `height`. Tile k, from
     /// 0, is the square of UV whose lower left corner is (k mod 10, ⌊k / 10⌋), also known as UDIM 1001 + k. No chart crosses the border of its tile.
     pub tiles: usize,
-    /// The density of all charts in texels to a unit of length, above 0, or `None` for the greatest that is found. With a given one, no more tiles are
-    /// used than are needed; where it does not fit into `tiles` tiles, charts get the greatest density that is found, with a warning.
+    /// The density of all charts that are larger than a texel, in texels to a unit of length, above 0, or `None` for the greatest that is found. A given
+    /// one is had in as few tiles as are found to do; where it does not fit into `tiles` tiles, charts get the greatest density that is found, with a
+    /// warning.
     pub texel_density: Option<f64>,
 }
 

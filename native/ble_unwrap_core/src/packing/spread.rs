@@ -96,7 +96,8 @@ pub(super) fn spread(
     if wanted.is_some_and(|wanted| reached >= wanted * (1.0 - SAME_SCALE)) {
         return Ok(packer.placed(found, wanted.unwrap_or(reached), None));
     }
-    let is_chart_too_large = found.is_one_chart_the_bound();
+    // Where there are obstacles, another tile may have more room for it.
+    let is_chart_too_large = constraints.obstacles.is_empty() && found.is_one_chart_the_bound();
     let tiles = found.loads.len();
     if let Some(wanted) = constraints.scale {
         return Err(PackError::TooLarge { shrunk: reached / wanted });
@@ -188,7 +189,8 @@ impl<'a> Packer<'a> {
     ) -> Result<Self, PackError> {
         let size = [settings.width, settings.height].map(f64::from);
         let further = beyond_safety(settings);
-        let border = constraints.border(settings) + further;
+        // Beyond the border there may be another tile, to whose charts the whole margin is kept.
+        let border = constraints.border(settings).max(0.5 * settings.margin_texels) + further;
         // Along both axes for both charts.
         let inner =
             PackSettings { margin_texels: settings.margin_texels + further * 8.0f64.sqrt(), ..settings.clone() };
@@ -357,7 +359,7 @@ impl<'a> Packer<'a> {
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
         if self.settings.tiles > 1 {
             // Every tile is packed twice, and a few are again.
-            self.progress.advance(Stage::Pack, done as f64 / (done + 2 * self.settings.tiles) as f64);
+            self.progress.advance(Stage::Pack, done as f64 / (done + 2 * self.most) as f64);
         }
         match found {
             Ok((dense, _)) => {

@@ -282,3 +282,31 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_chart_by_itself_is_enlarged_to_a_texel_where_its_density_asks_for_less() {
+    for density in [1e-6, 0.01, 1.0, 20.0] {
+        let charts = vec![regular(4, 1.0)];
+        for tiles in [1, 3] {
+            let packed = packed(&charts, &at_density(&tiled(256, 2.0, tiles), density));
+            assert!((packed.texels_per_unit / density - 1.0).abs() < 1e-9, "{} for {density}", packed.texels_per_unit);
+            assert_eq!(packed.specks, usize::from(density < 0.1), "at {density}");
+            assert!(packed.poses[0].scale >= density.max(0.4), "{} at {density}", packed.poses[0].scale);
+            assert_eq!(packed.shortfall, None);
+        }
+    }
+}
+
+#[test]
+fn charts_of_neighbouring_tiles_keep_the_margin_without_one_to_the_border() {
+    // Squares as large as tiles.
+    let charts = vec![regular(4, 1.0), regular(4, 1.0)];
+    let settings = PackSettings { rotation: Rotation::Any, ..tiled(256, 8.0, 2) };
+    let constraints = Constraints { border_texels: Some(0.0), ..Constraints::default() };
+    let packed = pack_within(&items(&charts), &constraints, &settings, &Progress::new()).expect("two squares");
+    let reach = |k: usize| charts[k].0.iter().map(|p| 256.0 * packed.uv(k, *p)[0]).collect::<Vec<f64>>();
+    let [first, second] = if packed.tiles[0] < packed.tiles[1] { [0, 1] } else { [1, 0] };
+    let right = reach(first).into_iter().fold(f64::MIN, f64::max);
+    let left = reach(second).into_iter().fold(f64::MAX, f64::min);
+    assert!(left - right >= 8.0, "{} texels apart", left - right);
+}

@@ -50,9 +50,9 @@ pub(crate) struct Rounding {
 }
 
 impl Rounding {
-    /// How much coarser the float32 grid is in this tile than below 1, at most: its far corner's larger coordinate.
+    /// How much coarser the float32 grid is in this tile than from ½ to 1, at most: it doubles at each power of two.
     fn coarseness(&self) -> f64 {
-        1.0 + self.corner[0].max(self.corner[1])
+        (1.0 + self.corner[0].max(self.corner[1])).log2().ceil().exp2()
     }
 }
 

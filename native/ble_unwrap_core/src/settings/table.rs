@@ -461,6 +461,6 @@ pub static TABLE: &[Setting] = &[
     row("texel_density", "Texel Density", Group::Density,
         Kind::OptionalReal(|s| &mut s.packing.texel_density, Interval::above(0.0, PackSettings::GREATEST_DENSITY), "the greatest that is found"),
         "texels per unit of length",
-        "How many texels a unit of length gets, in all charts. No more tiles are used than are needed for it; where there are too few, charts get the \
-         greatest density that is found, with a warning."),
+        "How many texels a unit of length gets, in all charts that are larger than a texel, in as few tiles as are found to do; where there are too \
+         few, charts get the greatest density that is found, with a warning."),
 ];

@@ -35,7 +35,8 @@ pub struct RepackRules<'a> {
     /// the corner of the texture opposite to the origin, also if the texture is not square. They may lie outside the texture. What stays keeps
     /// no margin to other things that stay.
     pub obstacles: Option<&'a [bool]>,
-    /// Least distance of the charts that move to the border of the texture, in texels; `None` for half the margin.
+    /// Least distance of the charts that move to the border of the texture, in texels; `None` for half the margin, which it is at least where there are
+    /// several tiles.
     pub border_texels: Option<f64>,
     /// How large charts are made.
     pub scale: RepackScale,

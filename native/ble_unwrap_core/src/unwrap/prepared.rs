@@ -7,7 +7,6 @@ use nalgebra::Point3;
 use crate::atlas::Atlas;
 use crate::cache::{Fingerprint, Kind, Run};
 use crate::clock::Clock;
-use crate::cutting::AtVertices;
 use crate::error::UnwrapError;
 use crate::mesh::{self, ConditionOptions, FaceId, Groups, MeshInput, Surface};
 use crate::progress::{Cancelled, Progress, Stage};
@@ -22,8 +21,6 @@ pub(super) struct Prepared {
     pub(super) surface: Surface,
     /// The faces of each piece, ascending. The pieces become meshes of their own only while they are charted.
     pub(super) components: Groups<FaceId>,
-    /// What a seam at each vertex of the surface counts for, by the wish of the user; `None` where there is none.
-    painted: Option<Vec<f32>>,
 }
 
 impl Prepared {
@@ -34,8 +31,7 @@ impl Prepared {
     ) -> Result<Self, UnwrapError> {
         let surface = mesh::canonical(mesh::condition(input, conditioning, progress)?, progress)?;
         let (label, count) = surface.mesh.components();
-        let painted = input.seam_weights.map(|weights| surface.vertex.iter().map(|&v| weights[v as usize]).collect());
-        Ok(Self { components: Groups::by_label(&label, count, FaceId::new), painted, surface })
+        Ok(Self { components: Groups::by_label(&label, count, FaceId::new), surface })
     }
 
     /// The stages after conditioning. Of `input` only positions, corners and offsets are looked at.
@@ -53,12 +49,8 @@ impl Prepared {
         let positions: Vec<Point3<f64>> =
             vertex.iter().map(|&v| input.positions[v as usize].map(|x| x / scale).into()).collect();
         let visibility = self.visibility(&positions, settings, run)?;
-        let vertices = AtVertices {
-            positions: &positions,
-            visibility: visibility.as_deref().map(Vec::as_slice),
-            painted: self.painted.as_deref(),
-        };
-        let (charts, rungs) = cutting::cut(&self.surface, &self.components, &vertices, settings, run)?;
+        let visibility = visibility.as_deref().map(Vec::as_slice);
+        let (charts, rungs) = cutting::cut(&self.surface, &self.components, &positions, visibility, settings, run)?;
         clock.lap("charts");
         layout::lay_out(input, &self.surface, charts, rungs, settings, clock, run)
     }

@@ -44,7 +44,8 @@ pub(crate) fn cut_across(
 ) -> Result<Vec<Chart>, Cancelled> {
     let area: f64 = charts.iter().map(|c| c.patch.area()).sum();
     let texture = [settings.packing.width, settings.packing.height].map(f64::from);
-    let most_filled = |chart: &Chart| area / (texture[0] * texture[1] * hold(&chart.uv, texture).powi(2));
+    let tiles = settings.packing.tiles.max(1) as f64;
+    let most_filled = |chart: &Chart| area / (tiles * texture[0] * texture[1] * hold(&chart.uv, texture).powi(2));
     let mut cutting = Cutting::new(mesh, polygon, charts);
     let is_too_long = |chart: &Chart| cost::fill_asks_for_a_cut(most_filled(chart), self_border(chart));
     let too_long = |id: &ChartId| cutting.chart(*id).is_some_and(is_too_long);

@@ -61,7 +61,11 @@ impl<'a> Colours<'a> {
         let form = Form::new(vertices.iter().map(|v| (self.mesh.position(*v), self.weight[v.index()])));
         let colour = |v: &VertexId| {
             let [radius, quantities @ ..] = form.quantities(self.mesh.position(*v));
-            (radius, quantities.into_iter().fold(step(radius), |hash, q| joined(hash, step(q))))
+            // Where nothing is painted the colour is that of the shape.
+            let weight = self.mesh.seam_weight(*v);
+            let painted = if weight == 1.0 { None } else { Some(u64::from(weight.to_bits())) };
+            let words = quantities.into_iter().map(step).chain(painted);
+            (radius, words.fold(step(radius), joined))
         };
         let coloured: Vec<(f64, u64)> = vertices.par_iter().with_min_len(TOGETHER).map(colour).collect();
         for (v, at_vertex) in vertices.iter().zip(coloured) {

@@ -37,7 +37,7 @@ use colours::Colours;
 use polygons::Polygons;
 use traversal::Traversal;
 
-/// The same surface with its faces, vertices and polygons numbered and placed by its shape alone.
+/// The same surface with its faces, vertices and polygons numbered and placed by its shape alone, and by what was marked and painted on it.
 ///
 /// Guaranteed: a surface that was moved, scaled uniformly, renumbered, or whose polygons begin at other corners gives the
 /// same mesh and the same polygons bit for bit, except for the cases below. Components come one after the other, those of
@@ -134,8 +134,10 @@ fn assemble<'a>(
     }
     let (mesh, old_vertex) = TriMesh::from_glued(&source, twin, |v| placed[v as usize]);
     let vertex = old_vertex.iter().map(|&v| surface.vertex[v as usize]).collect();
+    let old_vertices: Vec<VertexId> = old_vertex.iter().map(|&v| VertexId::new(v as usize)).collect();
+    let mesh = mesh.with_guides(guide).with_seam_weights(old.seam_weights_of(&old_vertices));
     let input_polygon = sides.iter().map(|h| surface.input_polygon(h.face()) as u32).collect();
-    Ok(Surface { mesh: Arc::new(mesh.with_guides(guide)), polygon, input_polygon, corner, vertex, ..surface })
+    Ok(Surface { mesh: Arc::new(mesh), polygon, input_polygon, corner, vertex, ..surface })
 }
 
 /// The arrays of the new mesh as they grow.

@@ -206,3 +206,33 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn what_is_painted_is_found_again_whatever_the_numbers() {
+    for (name, mesh) in [("ball", ico_sphere(2)), ("globe", uv_sphere(16, 8)), ("cube", bricks([4, 4, 4]))] {
+        let form = |mesh: &PolyMesh| {
+            let flat = mesh.flat();
+            let weights: Vec<f32> = mesh.positions.iter().map(|p| if p[0] > 0.6 { 10.0 } else { 1.0 }).collect();
+            let input = MeshInput {
+                positions: &mesh.positions,
+                corner_vertices: &flat.corner_vertices,
+                face_offsets: &flat.face_offsets,
+                seam_weights: Some(&weights),
+                ..MeshInput::default()
+            };
+            let surface = condition(&input, &ConditionOptions::default(), &Progress::new()).expect("a mesh");
+            let surface = canonical(surface, &Progress::new()).expect("not cancelled");
+            let mesh = &surface.mesh;
+            for v in mesh.vertices() {
+                assert_eq!(mesh.seam_weight(v), weights[surface.vertex[v.index()] as usize], "{name}");
+            }
+            let vertices: Vec<VertexId> = mesh.vertices().collect();
+            (mesh.seam_weights_of(&vertices), mesh.triangles().to_vec(), surface.polygon.clone())
+        };
+        let first = form(&mesh);
+        assert!(first.0.contains(&10.0) && first.0.contains(&1.0), "{name}");
+        for number in 1..6 {
+            assert_eq!(form(&mesh.renumbered(number)), first, "{name} {number}");
+        }
+    }
+}
