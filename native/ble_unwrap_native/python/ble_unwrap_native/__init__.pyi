@@ -168,7 +168,7 @@ class _PackingGroup(TypedDict, total=False):
 @type_check_only
 class _DensityGroup(TypedDict, total=False):
     texel_density: float | None
-    """How many texels a unit of length gets, in all charts. No more tiles are used than are needed for it; where there are too few, charts get the greatest density that is found, with a warning. None stands for the greatest that is found."""
+    """How many texels a unit of length gets, in all charts that are larger than a texel, in as few tiles as are found to do; where there are too few, charts get the greatest density that is found, with a warning. None stands for the greatest that is found."""
 
 @type_check_only
 class _UnwrapSettings(
