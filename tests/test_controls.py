@@ -103,22 +103,24 @@ def test_seams_stay_mirrored_where_one_side_is_painted():
     assert not ((abs(middles[:, 0]) > 0.5) & (middles[:, 1] > 0.4)).any(), "they keep away on both sides"
 
 
-def test_like_parts_that_are_painted_differently_are_no_copies(ball):
-    positions, corners, offsets = ball
+def test_like_parts_are_copies_only_where_they_are_painted_alike(blob):
+    positions, corners, offsets = blob
     count = len(positions)
     both = (
         np.concatenate([positions, positions + np.array([5, 0, 0])]),
         np.concatenate([corners, corners + count]),
         np.concatenate([offsets, offsets[1:] + offsets[-1]]),
     )
-    plain = unwrap(*both)
-    assert plain.report["rungs"]["copied"] == 1
-    painted = np.ones(2 * count)
-    painted[count:][positions[:, 0] > 0.1] = 10.0
-    atlas = unwrap(*both, seam_weights=painted)
-    assert "copied" not in atlas.report["rungs"]
-    middles = seam_middles(both, arrays(atlas)[0])
-    assert not (middles[:, 0] > 5.3).any()
+    weights = np.where(positions[:, 0] > 0.1, 10.0, 1.0)
+    alike = unwrap(*both, seam_weights=np.tile(weights, 2))
+    assert alike.report["rungs"]["copied"] == 1
+    different = unwrap(*both, seam_weights=np.concatenate([np.ones(count), weights]))
+    assert "copied" not in different.report["rungs"]
+    for atlas, first_keeps_away in ((alike, True), (different, False)):
+        x = seam_middles(both, arrays(atlas)[0])[:, 0]
+        first, second = x[x < 2.5], x[x > 2.5] - 5
+        assert ((first > 0.1).mean() < 0.15) == first_keeps_away
+        assert (second > 0.1).mean() < 0.15
 
 
 def test_wrong_seam_weights_are_named(square):

@@ -1,11 +1,17 @@
 //! A mirror plane of a mesh, across which its polygons are mirror images, too.
 
+use std::cell::RefCell;
+
 use nalgebra::{Point3, Vector3};
 
 use super::index::{FaceId, HalfedgeId, VertexId};
 use super::likeness::{Likeness, Shape};
 use super::tri_mesh::TriMesh;
 use crate::progress::{Cancelled, Progress};
+
+/// Seams count for about the same on both sides of a plane if they count for so many times as much on one in the mean. How far a vertex can be seen
+/// is known from a sample of directions, which differs by less.
+const MOST_UNEVEN: f64 = 1.25;
 
 /// A plane that mirrors.
 #[derive(Clone, Copy, Debug)]
@@ -73,23 +79,34 @@ impl Mirror {
 }
 
 /// Looks for a mirror plane of a connected mesh that divides it into two connected halves along edges. `polygon` names the polygon of
-/// each face, and all faces of one are beside each other. Where there are several, the first that is found; it need not be found
-/// in meshes that look alike from very many sides. O(n log n).
+/// each face, and all faces of one are beside each other. Where there are several, the first that is found across which seams count for about
+/// the same, or else the first; it need not be found in meshes that look alike from very many sides. O(n log n).
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
 pub(crate) fn mirror(mesh: &TriMesh, polygon: &[u32], progress: &Progress) -> Result<Option<Mirror>, Cancelled> {
     let Some(shape) = Shape::new(mesh, polygon) else { return Ok(None) };
-    let in_first = shape.find(&shape, true, progress, |image| {
+    let uneven = RefCell::new(None);
+    let even = shape.find(&shape, true, progress, |image| {
         let is_there_and_back = |h: HalfedgeId| image[h.index()].is_none() || image[image[h.index()].index()] == h;
         let is_mirror = mesh.halfedges().all(is_there_and_back) && is_reflection(&shape, image);
         let in_first = is_mirror.then(|| halves(mesh, image)).flatten()?;
-        Some((image.to_vec(), in_first))
+        let mirror = Mirror { likeness: Likeness::of_itself(image.to_vec()), in_first };
+        if unevenness(mesh, image) <= MOST_UNEVEN.ln() {
+            return Some(mirror);
+        }
+        uneven.borrow_mut().get_or_insert(mirror);
+        None
     })?;
-    Ok(in_first.map(|(image, in_first)| {
-        let likeness = Likeness::of_itself(image);
-        Mirror { likeness, in_first }
-    }))
+    Ok(even.or_else(|| uneven.into_inner()))
+}
+
+/// How many times as much, in the mean and as a logarithm, a seam counts for on one side of a mirror plane as on the other.
+fn unevenness(mesh: &TriMesh, image: &[HalfedgeId]) -> f64 {
+    let weight = |v: VertexId| f64::from(mesh.seam_weight(v)).ln();
+    let sides = || mesh.halfedges().filter(|h| !image[h.index()].is_none());
+    let apart = |h: HalfedgeId| (weight(mesh.from(h)) - weight(mesh.to(image[h.index()]))).abs();
+    sides().map(apart).sum::<f64>() / sides().count().max(1) as f64
 }
 
 /// For each face whether it is on the side of the first face, where edges that are their own image divide the mesh into two.
@@ -192,6 +209,27 @@ mod tests {
         let (plain, _) = sheet(8, |x, y| (x - 4.0).powi(2) * 0.1 + 0.3 * y + 0.05 * y * y);
         let even = found(&plain, &polygon).expect("a plane at x = 4").with_even_seam_weights(&plain);
         assert!(even.seam_weights_of(&vertices).is_empty(), "where all count alike nothing is kept");
+    }
+
+    #[test]
+    fn of_several_planes_one_is_taken_across_which_seams_count_for_the_same() {
+        let mesh = test_surfaces::cubes([4, 4, 4], |_| true);
+        let polygon: Vec<u32> = (0..mesh.face_count() as u32).map(|f| f / 2).collect();
+        for axis in 0..3 {
+            let weights = mesh.positions().iter().map(|p| if p[axis] < 2.0 { 10.0 } else { 1.0 }).collect();
+            let painted = mesh.clone().with_seam_weights(weights);
+            let mirror = found(&painted, &polygon).expect("a cube has many planes");
+            let plane = mirror.plane(&painted, painted.positions()).expect("a plane");
+            let [low, high] = [1.0, 3.0].map(|x| {
+                let mut p = Point3::new(2.0, 2.0, 2.0);
+                p[axis] = x;
+                plane.mirrored(p)[axis]
+            });
+            assert!((low - 1.0).abs() < 1e-9 && (high - 3.0).abs() < 1e-9, "along {axis}");
+        }
+        // Where no plane respects them, there is one nevertheless.
+        let weights = mesh.positions().iter().map(|p| 1.0 + (p.x + 3.0 * p.y + 10.0 * p.z) as f32).collect();
+        assert!(found(&mesh.clone().with_seam_weights(weights), &polygon).is_some());
     }
 
     #[test]
