@@ -128,7 +128,7 @@ def flatten_settings(preset):
     """The settings of a preset that `flatten` takes."""
     unwraps = {"stretch_limit", "limit_over", "coarse", "moves", "stretch_price", "holes", "chart_scale"}
     unwraps |= {"hide_seams", "front", "symmetry", "style", "straighten"}
-    unwraps |= {"crease_weight", "margin", "texture_size", "rotation", "quality"}
+    unwraps |= {"crease_weight", "margin", "texture_size", "rotation", "quality", "tiles", "texel_density"}
     return {name: value for name, value in native.default_settings(preset).items() if name not in unwraps}
 
 
