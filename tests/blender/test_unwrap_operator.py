@@ -403,7 +403,7 @@ def test_seams_keep_away_from_what_is_painted_or_run_there(kind, mode):
 
 
 def test_what_is_painted_stays_at_its_vertices_where_some_faces_of_several_objects_are_unwrapped(addon):
-    painted, _ = painted_ball("group")
+    painted, half = painted_ball("group")
     plain = sphere("Plain", cells=4)
     edit(painted, plain, faces=np.arange(0, len(painted.data.polygons), 3))
     chosen = addon("mesh_bridge").gather([painted, plain], only_selected=True, seams_away="Painted")
@@ -411,7 +411,8 @@ def test_what_is_painted_stays_at_its_vertices_where_some_faces_of_several_objec
     assert chosen.seam_weights.shape == (count,)
     of_painted = np.unique(chosen.corner_vertices[chosen.parts[0].corners])
     assert 0 < len(of_painted) < min(count, len(painted.data.vertices))
-    is_half = chosen.positions[of_painted, 0] > 0.1 * painted.dimensions.x
+    faces = [painted.data.polygons[face].vertices for face in chosen.parts[0].source_faces]
+    is_half = np.isin(sorted({vertex for face in faces for vertex in face}), sorted(half))
     np.testing.assert_allclose(chosen.seam_weights[of_painted], np.where(is_half, 10.0, 1.0), rtol=1e-6)
     others = np.setdiff1d(np.arange(count), of_painted)
     assert (chosen.seam_weights[others] == 1.0).all()

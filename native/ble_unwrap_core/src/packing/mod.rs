@@ -143,11 +143,12 @@ pub struct PackSettings {
     /// How long to search.
     pub quality: Quality,
     /// Over how many tiles of the texture charts may be spread, 1 to [`PackSettings::MOST_TILES`], each as large as `width` by `height`. Tile k, from
-    /// 0, is the square of UV whose lower left corner is (k mod 10, ⌊k / 10⌋), also known as UDIM 1001 + k. No chart crosses the border of its tile.
+    /// 0, is the square of UV whose lower left corner is (k mod 10, ⌊k / 10⌋), also known as UDIM 1001 + k. No chart crosses the border of its tile. A point
+    /// cloud gets one tile whatever this is.
     pub tiles: usize,
     /// The density of all charts that are larger than a texel, in texels to a unit of length, above 0, or `None` for the greatest that is found. A given
     /// one is had in as few tiles as are found to do; where it does not fit into `tiles` tiles, charts get the greatest density that is found, with a
-    /// warning.
+    /// warning. For a point cloud it has no meaning.
     pub texel_density: Option<f64>,
 }
 
