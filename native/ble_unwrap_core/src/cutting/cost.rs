@@ -222,11 +222,6 @@ fn unrolls(chart: &Chart) -> bool {
     chart.l2 <= UNROLLED
 }
 
-/// Whether only what unrolls comes under a limit.
-pub(super) fn has_to_unroll(limit: f64) -> bool {
-    limit <= UNROLLED
-}
-
 /// Whether what comes in the place of some charts has to unroll: where they all do, or one is a part between hard edges.
 fn is_kept_unrolled(charts: &[&Chart]) -> bool {
     charts.iter().all(|chart| unrolls(chart)) || charts.iter().any(|chart| is_unrolled_part(chart))

@@ -101,10 +101,8 @@ pub(super) fn tried(
         }
         let under_price = Settings { stretch_limit, ..settings.clone() };
         match trial(cutting, &way, &under_price, &mut rungs, run)? {
-            // What has to unroll seldom does so from another start.
-            Verdict::BadStart if stretch_limit < settings.stretch_limit && cost::has_to_unroll(stretch_limit) => (),
-            Verdict::BadStart => verdict = Verdict::BadStart,
             Verdict::Refused => (),
+            Verdict::BadStart => verdict = Verdict::BadStart,
             Verdict::Charts(charts) => {
                 if price.is_none_or(|price| price.is_worth(&old, &charts)) {
                     return Ok((Verdict::Charts(charts), rungs));
