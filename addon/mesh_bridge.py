@@ -155,7 +155,7 @@ def gather(
         raise MeshError("The selection is too large: more than two thousand million corners")
     if missing := [name for name in dict.fromkeys((seams_away, seams_here)) if name and name not in found]:
         names = " or ".join(f'"{name}"' for name in missing)
-        warnings.append(f"There is no vertex group and no attribute of one number a point named {names}")
+        warnings.append(f"There is no vertex group and no float attribute on points named {names}")
     positions, corner_vertices, sizes, triangles, weights, *marks = (
         np.concatenate(column) for column in zip(*blocks, strict=True)
     )

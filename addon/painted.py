@@ -11,7 +11,7 @@ FULL_WEIGHT = 10.0  # at full weight a seam counts for so many times its length,
 def seam_weights(obj, away, here):
     """What a seam at each vertex of a mesh object counts for, (n,) float32, and those of the two names that it has.
 
-    `away` and `here` name a vertex group, or an attribute of one number a point, whose values from 0 to 1 say where
+    `away` and `here` name a vertex group, or a float attribute on points, whose values from 0 to 1 say where
     seams are to keep away, and where they are welcome; without a name, or where the object has neither, nowhere. A mesh
     in edit mode has to be up to date.
     """

@@ -120,7 +120,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     seams_away: StringProperty(
         name="Keep Seams Away",
         description=(
-            "A vertex group, or an attribute of one number a point, that says where seams are to keep away: at a "
+            "A vertex group, or a float attribute on points, that says where seams are to keep away: at a "
             "weight of 1 a seam counts for ten times its length"
         ),
         default="",
@@ -128,7 +128,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     seams_here: StringProperty(
         name="Seams Here",
         description=(
-            "A vertex group, or an attribute of one number a point, that says where seams are welcome: at a weight of "
+            "A vertex group, or a float attribute on points, that says where seams are welcome: at a weight of "
             "1 a seam counts for a tenth of its length"
         ),
         default="",

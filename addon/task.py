@@ -90,10 +90,8 @@ class UnwrapTask:
         held = mesh_bridge.read_uvs(self.selection, self.target)
         self.bounds, why_not = bounds_to_keep(held, self.settings["texture_size"])
         if self.bounds is not None and self.native["tiles"] > 1 and self.bounds.extent.max() > 1.0:
-            self.bounds, why_not = (
-                None,
-                "The old UVs take more than one tile, so no place was kept; all tiles were used",
-            )
+            self.bounds = None
+            why_not = "The old UVs take more than one tile, so no place was kept; all tiles were used"
         if self.bounds is None:
             self.selection.warnings.append(why_not)
         else:

@@ -1,4 +1,6 @@
-"""Meshes for the tests, and what is read off their UVs."""
+"""Meshes for the tests, and what is read off their UVs and off the panel."""
+
+import json
 
 import bpy
 import demo_meshes
@@ -114,6 +116,11 @@ def assert_good(obj):
     assert uv.min() >= 0 and uv.max() <= 1
     assert (triangle_areas(obj, uv) > 0).all()
     return uv
+
+
+def certificate():
+    """The lines of Last Result in the panel, each with its status."""
+    return json.loads(bpy.context.window_manager.ble_unwrap_certificate.lines)
 
 
 def fingerprint(obj):

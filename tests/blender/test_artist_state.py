@@ -1,23 +1,30 @@
 """What an artist has set in Blender, and what an unwrap does with it: seams, selections, pins, images, UV maps."""
 
-import json
-
 import bmesh
 import bpy
 import numpy as np
 import pytest
-from scenes import assert_good, cube, edit, grid, is_cut, select, set_uvs, sphere, surface_areas, triangle_areas, uvs
+from scenes import (
+    assert_good,
+    certificate,
+    cube,
+    edit,
+    grid,
+    is_cut,
+    select,
+    set_uvs,
+    sphere,
+    surface_areas,
+    triangle_areas,
+    uvs,
+)
 
 unwrap = bpy.ops.uv.ble_unwrap
 SYNC_IN_MESH = hasattr(bmesh.types.BMFace, "uv_select")  # 5.0 and later keep the UV selection with the mesh
 
 
-def lines():
-    return json.loads(bpy.context.window_manager.ble_unwrap_certificate.lines)
-
-
 def warnings():
-    return [text for status, text in lines() if status == "WARN"]
+    return [text for status, text in certificate() if status == "WARN"]
 
 
 def seams(obj):
@@ -27,7 +34,7 @@ def seams(obj):
 
 
 def chart_count():
-    return lines()[0][1].split(" in ")[1]
+    return certificate()[0][1].split(" in ")[1]
 
 
 # Seams --------------------------------------------------------------------------------------------------------------
@@ -247,7 +254,7 @@ def test_overlap_with_faces_that_were_kept_is_told(addon):
     edit(obj, faces=list(range(12)))
     unwrap()
     told = [text for text in warnings() if text.startswith("New charts overlap faces that were not unwrapped")]
-    summary = next(text for _, text in lines() if "overlap" in text)
+    summary = next(text for _, text in certificate() if "overlap" in text)
     bpy.ops.object.mode_set(mode="OBJECT")
     assert addon("comparison").overlapping_faces([obj]) > 0
     assert len(told) == 1 and not summary.endswith("none with faces that were not unwrapped")
@@ -259,7 +266,7 @@ def test_overlap_with_faces_that_were_kept_is_told(addon):
     set_uvs(obj, values)
     edit(obj, faces=list(range(12)))
     unwrap(use_original_bounds=True)
-    assert ["OK", "0 overlaps, none with faces that were not unwrapped"] in lines()
+    assert ["OK", "0 overlaps, none with faces that were not unwrapped"] in certificate()
     bpy.ops.object.mode_set(mode="OBJECT")
     assert addon("comparison").overlapping_faces([obj]) == 0
 
@@ -267,7 +274,7 @@ def test_overlap_with_faces_that_were_kept_is_told(addon):
 def test_overlaps_are_not_searched_where_all_faces_were_unwrapped():
     cube()
     unwrap()
-    assert ["OK", "0 overlaps"] in lines()
+    assert ["OK", "0 overlaps"] in certificate()
 
 
 def pin(obj, corners):
@@ -358,7 +365,7 @@ def test_squares_are_square_on_the_image(size):
     textured(obj, size)
     unwrap()
     assert pixel_extent(obj, size) == pytest.approx(1, abs=0.01)  # 2:1 without it: 340 by 679 pixels
-    assert any("proportions of the image Wood.png" in text for status, text in lines() if status == "INFO")
+    assert any("proportions of the image Wood.png" in text for status, text in certificate() if status == "INFO")
     unwrap(correct_aspect=False)
     assert pixel_extent(obj, (1, 1)) == pytest.approx(1, abs=0.01)
 
@@ -386,7 +393,7 @@ def test_the_active_material_decides_and_others_are_mentioned():
     obj.active_material_index = 1
     unwrap()
     assert pixel_extent(obj, (256, 128)) == pytest.approx(1, abs=0.01)
-    assert any("Wide.png; other images have other proportions" in text for _, text in lines())
+    assert any("Wide.png; other images have other proportions" in text for _, text in certificate())
 
 
 def test_a_comparison_is_made_at_the_proportions_of_the_image(addon):

@@ -1,7 +1,5 @@
 """Meshes of vertices alone and point cloud objects, by the operator."""
 
-import json
-
 import bpy
 import numpy as np
 import pytest
@@ -10,6 +8,7 @@ from scenes import (
     assert_good,
     assert_points_mapped,
     attribute_names,
+    certificate,
     cube,
     edit,
     fingerprint,
@@ -26,10 +25,6 @@ from scenes import (
 unwrap = bpy.ops.uv.ble_unwrap
 BOTH = pytest.mark.parametrize("make", [vertices_only, point_cloud])
 HAS_POINT_CLOUD_EDIT_MODE = bpy.app.version >= (4, 5)
-
-
-def certificate():
-    return json.loads(bpy.context.window_manager.ble_unwrap_certificate.lines)
 
 
 def refused(match, **settings):

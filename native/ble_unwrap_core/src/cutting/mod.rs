@@ -73,8 +73,6 @@ pub(crate) fn cut(
         None => Arc::clone(&surface.mesh),
     };
     let polygon = &surface.polygon;
-    // Of what counts for seams, likeness is about what the user wishes, not about what can be seen.
-    let unweighed_patch_of = |component: usize| whole(&surface.mesh, polygon, components.group(component));
     let charted = Charted::new(run.progress, mesh.face_count());
     let patch_of = |component: usize| whole(mesh, polygon, components.group(component));
     let of_component = |component: usize| {
@@ -82,7 +80,8 @@ pub(crate) fn cut(
         charts_of(&patch, components.group(component), settings, &charted, run)
     };
     let placed = |component: usize| {
-        let patch = unweighed_patch_of(component);
+        // Without the weights of what can be seen: parts are alike wherever they are hidden, if seams there are wished alike.
+        let patch = whole(&surface.mesh, polygon, components.group(component));
         let mut place = vec![Point3::origin(); patch.mesh.vertex_count()];
         for (f, local) in components.group(component).iter().zip(patch.mesh.triangles()) {
             for (v, local) in mesh.triangle(*f).iter().zip(local) {

@@ -3,27 +3,22 @@
 use nalgebra::Point2;
 
 use crate::cache::{Fingerprint, Kind, Run};
-use crate::charts::{Chart, Patch};
+use crate::charts::Patch;
 use crate::distortion::{self, RestTriangle};
 use crate::embedding::{self, EmbeddingError, Model};
 use crate::geodesics::LandmarkDistances;
-use crate::mesh::{FaceId, TriMesh};
+use crate::mesh::FaceId;
 use crate::progress::Cancelled;
 use crate::settings::Settings;
 use crate::stretch::{self, BOUNDARY_REACH, Minimised, Stitcher, StretchError};
 
+use super::flat::{Flat, Positions, judge, l2};
 use super::rungs::{Rung, Rungs};
 use super::steps::Steps;
-
-/// A chart is refused if one hundredth of its area is stretched by more than this: it would blur
-/// visibly there although its L2, an average, is fine.
-const MOST_P99_STRETCH: f64 = 4.0;
 
 /// An isometry has no more L2 stretch than this; half a degree between normals alone gives 1.0001,
 /// half a per cent of strain 1.006. What is above has folded away area that lies in thin faces.
 const ISOMETRIC: f64 = 1.01;
-/// Height (the whole surface has area 1) up to which a face's lengths are rounding.
-const NEGLIGIBLE: f64 = 1e-8;
 /// An embedding folded over more of its area than this is near no flat map. Of 598 trials on three
 /// development models 275 were above; 7 of these ended under the limit, after most of the time spent on all. The printed
 /// model folds even what is flat, so of it this tells nothing.
@@ -48,27 +43,12 @@ const MOST_FOR_TUTTE: usize = 100;
 /// A patch whose faces all lean less than 70° from their mean normal is flattened from its projection.
 const MOST_LEANING: f64 = 70.0;
 
-/// A position in the plane for each vertex.
-pub(crate) type Positions = Vec<Point2<f64>>;
-
 fn bytes_of_start(start: &Option<Positions>) -> usize {
     16 * start.as_ref().map_or(0, Vec::len)
 }
 
 /// A chart over the limit by so many times at most may come under it by one cut. See `LATE_DARTS` in `cutting/attempt.rs`.
 const NEAR: f64 = 1.25;
-
-/// A patch flattened without flips and without overlap.
-pub(crate) struct Flat {
-    pub(crate) uv: Positions,
-    pub(crate) l2: f64,
-}
-
-impl Flat {
-    pub(crate) fn into_chart(self, patch: Patch) -> Chart {
-        Chart { patch, uv: self.uv, l2: self.l2 }
-    }
-}
 
 /// What came of flattening a patch under a limit.
 pub(crate) enum Flattened {
@@ -99,12 +79,6 @@ fn isometric_of(patch: &Patch, rest: &[RestTriangle], rungs: &mut Rungs) -> Opti
         .or_else(|| sound(embedding::unfold(mesh, &RestTriangle::needles_of_mesh(mesh))?, Rung::Unfold))?;
     rungs.take(rung);
     Some(flat)
-}
-
-/// L2 stretch of the surface as it is; of the thickened rest triangles where it has no area.
-pub(crate) fn l2(patch: &Patch, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
-    let true_l2 = stretch::l2_of_positions(&patch.mesh, uv, NEGLIGIBLE);
-    if true_l2.is_nan() { stretch::l2_stretch(&patch.mesh, rest, uv) } else { true_l2 }
 }
 
 /// Flattens a patch of genus 0 with a boundary by embedding and stretch minimisation. The work stops as soon as it is clear
@@ -514,35 +488,6 @@ impl<'a> Trial<'a> {
     }
 }
 
-/// A chart of a map; the map again where it is over the limit.
-fn judge(patch: &Patch, rest: &[RestTriangle], uv: Positions, limit: Option<f64>) -> Result<Flat, Positions> {
-    let l2 = l2(patch, rest, &uv);
-    let good = limit.is_none_or(|limit| l2 <= limit && is_sharp(&patch.mesh, rest, &uv));
-    if good { Ok(Flat { uv, l2 }) } else { Err(uv) }
-}
-
-/// Whether so little of a map is stretched so much that nobody sees it blurred.
-fn is_sharp(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> bool {
-    p99_stretch(mesh, rest, uv) <= MOST_P99_STRETCH
-}
-
-/// The stretch that 99 % of the area stays under, with the chart at the area of its surface.
-fn p99_stretch(mesh: &TriMesh, rest: &[RestTriangle], uv: &[Point2<f64>]) -> f64 {
-    let squared = |f: FaceId| {
-        let corners = mesh.triangle(f).map(|v| uv[v.index()]);
-        distortion::squared_stretch(&rest[f.index()].jacobian(corners))
-    };
-    let mut faces: Vec<(f64, f64)> = mesh.faces().map(|f| (squared(f), rest[f.index()].area())).collect();
-    faces.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let total: f64 = faces.iter().map(|f| f.1).sum();
-    let mut below = 0.0;
-    let p99 = faces.iter().find(|f| {
-        below += f.1;
-        below >= 0.99 * total
-    });
-    p99.map_or(1.0, |f| (f.0 * stretch::plane_area(mesh, uv) / total).sqrt())
-}
-
 /// A patch that defeats a solver or has no injective map is refused like one that is too stretched.
 fn recover<T>(result: Result<T, StretchError>, refused: T) -> Result<T, Cancelled> {
     match result {
@@ -553,6 +498,7 @@ fn recover<T>(result: Result<T, StretchError>, refused: T) -> Result<T, Cancelle
 
 #[cfg(test)]
 mod tests {
+    use super::super::flat::NEGLIGIBLE;
     use super::*;
     use crate::mesh::test_surfaces;
     use crate::progress::Progress;

@@ -11,7 +11,8 @@ use crate::geodesics::LandmarkDistances;
 use crate::progress::Cancelled;
 use crate::settings::Settings;
 
-use super::ladder::{self, Flat, Flattened, l2};
+use super::flat::{Flat, l2};
+use super::ladder::{self, Flattened};
 use super::rungs::{Rung, Rungs};
 
 /// Flattens a patch that is one polygon, which cannot be split: as well as it goes, and at worst on a

@@ -7,7 +7,7 @@ use crate::distortion::RestTriangle;
 use crate::mesh::HalfedgeId;
 use crate::stretch;
 
-use super::ladder::{Flat, Positions, l2};
+use super::flat::{Flat, Positions, l2};
 
 /// A border that turns by at least so many degrees at a vertex has a corner there: the frame of a picture is no ring.
 const CORNER: f64 = 50.0;

@@ -179,7 +179,7 @@ pub(super) fn densest_up_to(
         Quality::Fast if n < ROWS_TRIED => None,
         _ => many::in_rows(&fine, &areas, margin, [guess, ceiling])?,
     };
-    // Where the result cannot become better, the search is not gone on with. Of one tile with a given scale it is, since what is found last is taken.
+    // The search ends early where the result cannot become better; not for one tile with a given scale, where what is found last is taken.
     let stops_early = settings.tiles > 1 || settings.texel_density.is_some();
     let rows_suffice = stops_early && in_rows.as_ref().is_some_and(|rows| rows.density >= ceiling);
     if n >= ROWS_ONLY || rows_suffice {
