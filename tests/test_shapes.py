@@ -316,9 +316,12 @@ def test_rings_are_round_and_walls_are_rectangles(name, number, kind):
 @cases(
     "pipe bend",
     short={
-        "cut along its outside or its flank": ["1, turned", "2, turned"],
-        "cut along its outside or its flank where its quads are triangles": ["1, triangles", "2, triangles"],
-        "cut along its outside, so that the strip has a waist": ["3, triangles"],
+        "cut along the flank that is turned from the front, not inside the bend": ["1, turned", "2, turned"],
+        "cut along the flank that is turned from the front, where its quads are triangles": [
+            "1, triangles",
+            "2, triangles",
+        ],
+        "cut along the outside, away from the front, so that the strip has a waist": ["3, triangles"],
     },
 )
 def test_a_pipe_bend_is_a_rectangle_cut_on_the_inside_of_the_bend(name, number, kind):
@@ -401,6 +404,17 @@ def test_a_gear_is_two_rings_and_strips_without_stretch(name, number, kind):
     assert set(layout.chart[flat].tolist()).isdisjoint(layout.chart[~flat].tolist()), "cut at the hard edges"
     for chart in set(layout.chart[~flat].tolist()):
         assert_rectangle(layout, chart)
+
+
+@cases(
+    "skirt",
+    kinds=(0, 1),
+    short={"of two halves the longer border is joined, that of the front or of the back": ["1", "2"]},
+)
+def test_a_skirt_is_cut_along_its_back(name, number, kind):
+    layout, report = unwrapped(name, number, kind)
+    assert report["charts"] == 1 and len(layout.seams)
+    assert is_at_the_back(name, number, layout.seam_vertices.ravel())
 
 
 # Balls ----------------------------------------------------------------------------------------------------------------

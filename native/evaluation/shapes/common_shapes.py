@@ -260,6 +260,18 @@ def road(bend, rise):
     return grid(40, 2, place)
 
 
+def skirt(front, flare):
+    """An open tube as a skirt is: its front this much deeper than its back, wider below, round over the hips."""
+
+    def place(u, v):
+        angle = FULL_TURN * u
+        wide = 1 + flare * (1 - v) + 0.25 * np.sin(3 * (1 - v)) * (1 + 0.4 * np.cos(2 * angle))
+        deep = np.where(np.cos(angle) > 0, front, 1.0)
+        return 1.1 * wide * np.sin(angle), -wide * deep * np.cos(angle), 2 * v + 0 * u
+
+    return grid(SIDES, 8, place, (True, False))
+
+
 def torus(thickness):
     def place(u, v):
         away = 1 + thickness * np.cos(FULL_TURN * v)
@@ -440,6 +452,7 @@ SHAPES = {
     "cable": Shape(cable, ((0.5, 4), (1, 4), (2, 8)), _STRIP),
     "belt": Shape(belt, ((2.5, 0.4), (4, 0.4), (4, 1)), "four straight strips"),
     "road": Shape(road, ((_arc, 0), (_two_arcs, 0), (_straight, 1.5)), "one straight strip", FROM_ABOVE),
+    "skirt": Shape(skirt, ((0.8, 0), (0.8, 0.3), (1.2, 0)), "one piece, cut along its back"),
     "torus": Shape(torus, ((0.15,), (0.35,), (0.6,)), "one or two straight strips, cut along the inner equator"),
     "UV sphere": Shape(uv_sphere, ((16, 8), (24, 12), (32, 16)), "two to six like pieces or gores"),
     "ball": Shape(ball, ((3,), (6,), (10,)), "two to six like pieces"),
