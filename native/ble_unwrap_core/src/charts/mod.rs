@@ -5,6 +5,8 @@
 
 mod cut_to_disk;
 mod patch;
+mod straight_cut;
 
 pub(crate) use cut_to_disk::{cut_open, cut_to_disk, shortest_path_to_boundary};
 pub(crate) use patch::{Chart, Patch};
+pub(crate) use straight_cut::straight_cut;

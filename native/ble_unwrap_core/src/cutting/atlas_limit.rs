@@ -99,7 +99,8 @@ impl Budget<'_> {
                 return Ok(None);
             }
             let site = Site { place: Place::between(pair[0], pair[1]), charts: pair.to_vec(), ways: Vec::new() };
-            let (verdict, _) = tried(&self.cutting, &Join { which: Which::EVERY }, &site, None, &settings, run)?;
+            let (verdict, _) =
+                tried(&self.cutting, &Join { which: Which::EVERY, alone: 1 }, &site, None, &settings, run)?;
             let Verdict::Charts(charts) = verdict else { return Ok(None) };
             let Ok([chart]) = <[Chart; 1]>::try_from(charts) else { return Ok(None) };
             let added = area * chart.l2 * chart.l2 - before[0] - before[1];

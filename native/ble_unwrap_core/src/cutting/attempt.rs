@@ -6,7 +6,7 @@ use crate::cache::Run;
 use crate::charts::{self, Chart, Patch};
 use crate::flattening::{self, Flattened, Positions, Rung, Rungs};
 use crate::geodesics::LandmarkDistances;
-use crate::mesh::Topology;
+use crate::mesh::{HalfedgeId, Topology};
 use crate::progress::Cancelled;
 use crate::segmentation::{self, SpectralAnalysis};
 use crate::settings::{Holes, Moves, Settings};
@@ -170,8 +170,20 @@ impl<'a> Attempt<'a> {
 
     fn cut_to_disk(&self) -> Patch {
         let patch = self.patch();
-        let length = |h| CutPrice::new(self.settings).of(&patch.mesh, h);
-        patch.cut(&charts::cut_to_disk(&patch.mesh, length, |h| patch.is_diagonal(h)))
+        let price = |h| CutPrice::new(self.settings).of(&patch.mesh, h);
+        let cuts = charts::cut_to_disk(&patch.mesh, price, |h| patch.is_diagonal(h));
+        if self.topology.loops == 2 && self.topology.genus() == 0 && !cost::may_bend(self.settings.stretch_price) {
+            // A straight border is worth as much here as anywhere.
+            let straight = charts::straight_cut(&patch.mesh, price, |h| patch.is_diagonal(h));
+            let least: f64 = cuts.iter().map(|&h| price(h)).sum();
+            let length = |cut: &[HalfedgeId]| cut.iter().map(|&h| patch.mesh.edge_length(h)).sum::<f64>();
+            if let Some((line, cost)) = straight
+                && cost <= least + self.settings.straighten * length(&line)
+            {
+                return patch.cut(&line);
+            }
+        }
+        patch.cut(&cuts)
     }
 
     /// A thin ring as a straight strip, if its straight borders are worth the stretch.

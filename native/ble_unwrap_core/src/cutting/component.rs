@@ -40,9 +40,9 @@ pub(crate) fn charts(
     let mut rungs = Rungs::default();
     let is_large = is_large(whole, settings);
     let all_unroll = whole.mesh.is_all_parts() && segmentation::between_parts(&whole.mesh).is_some();
-    if !all_unroll && let Some(mirror) = symmetric::mirror(whole, is_large, settings, run)? {
+    if !all_unroll && let Some(mirrored) = symmetric::mirrored(whole, is_large, settings, run)? {
         let of_half = |half: &Patch, faces: &[FaceId], once: &Settings| charts(half, faces, once, charted, run);
-        if let Some((mut charts, rungs)) = symmetric::charts(whole, &mirror, is_large, settings, &of_half, run)? {
+        if let Some((mut charts, rungs)) = symmetric::charts(whole, &mirrored, is_large, settings, &of_half, run)? {
             charted.add(0.5 * size, 1.0);
             rename(&mut charts, faces);
             return Ok((charts, rungs));

@@ -18,6 +18,7 @@ mod edit;
 mod history;
 mod level;
 mod measured;
+mod merged;
 mod moves;
 mod rigid_motion;
 mod search;

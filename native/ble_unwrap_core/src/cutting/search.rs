@@ -12,7 +12,7 @@ use crate::settings::Settings;
 
 use super::cost::{self, Price};
 use super::history::{History, MoveKind};
-use super::moves::{Move, Site};
+use super::moves::{Move, Proposal, Site};
 use super::state::{ChartId, Cutting};
 use super::trial::{Verdict, trial};
 
@@ -79,8 +79,8 @@ fn disjoint(mut sites: Vec<Site>) -> Vec<Site> {
     sites
 }
 
-/// What comes of a move at a site: the first of its ways that makes charts, and where there is a price, is worth it; the moves of the
-/// search glue, so that one chart takes the place of all. One with a bad start tells that another may do.
+/// What comes of a move at a site: the first of its ways that makes charts, and where there is a price, is worth it, or the cheapest of these;
+/// the moves of the search glue, so that one chart takes the place of all. One with a bad start tells that another may do.
 pub(super) fn tried(
     cutting: &Cutting<'_>,
     made: &dyn Move,
@@ -93,7 +93,12 @@ pub(super) fn tried(
     let mut verdict = Verdict::Refused;
     let price = price.map(|price| made.price(*price));
     let old: Vec<&Chart> = site.charts.iter().filter_map(|&id| cutting.chart(id)).collect();
+    let mut best: Option<(f64, Proposal, Vec<Chart>)> = None;
     for way in made.ways(cutting, site, run)? {
+        // From another start the same edit makes the same charts, or hardly better ones.
+        if best.as_ref().is_some_and(|(_, made, _)| made.edit.glued() == way.edit.glued()) {
+            continue;
+        }
         let glued = way.edit.glued_length(cutting);
         let stretch_limit = price.map_or(settings.stretch_limit, |price| price.limit_of_union(&old, glued, settings));
         if price.is_some() && cost::is_out_of_reach(&old, stretch_limit) {
@@ -104,11 +109,18 @@ pub(super) fn tried(
             Verdict::Refused => (),
             Verdict::BadStart => verdict = Verdict::BadStart,
             Verdict::Charts(charts) => {
-                if price.is_none_or(|price| price.is_worth(&old, &charts)) {
+                if price.is_some_and(|price| !price.is_worth(&old, &charts)) {
+                    continue;
+                }
+                let cost = price.map_or(0.0, |price| charts.iter().map(|chart| price.of(chart)).sum());
+                if !made.takes_cheapest() {
                     return Ok((Verdict::Charts(charts), rungs));
+                }
+                if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
+                    best = Some((cost, way, charts));
                 }
             }
         }
     }
-    Ok((verdict, rungs))
+    Ok((best.map_or(verdict, |(_, _, charts)| Verdict::Charts(charts)), rungs))
 }

@@ -17,6 +17,7 @@ use super::attempt;
 use super::copied::copied;
 use super::cost::Price;
 use super::history::{History, MoveKind};
+use super::merged::Merged;
 use super::moves::join::{Join, Which};
 use super::moves::partial_join::PartialJoin;
 use super::moves::zip::Zip;
@@ -24,13 +25,23 @@ use super::moves::{Move, Proposal, Site, Start};
 use super::search::search;
 use super::state::{ChartId, Cutting};
 
+/// Halves may be joined along any of so many runs of their border alone: a tube has two.
+const MOST_ALONE: usize = 2;
+
+/// A patch that has a mirror plane.
+pub(super) struct Mirrored {
+    mirror: Mirror,
+    /// Where triangles have to be taken together for it.
+    merged: Option<Merged>,
+}
+
 /// The mirror plane of a patch, if it is to be charted by halves. A large one is not looked at for whether it is better left in one piece.
-pub(super) fn mirror(
+pub(super) fn mirrored(
     patch: &Patch,
     is_large: bool,
     settings: &Settings,
     run: &Run<'_>,
-) -> Result<Option<Mirror>, Cancelled> {
+) -> Result<Option<Mirrored>, Cancelled> {
     // Guides say where to cut, and a limit over the atlas joins charts across the plane as it likes.
     let is_wanted = settings.symmetry == Symmetry::Auto
         && settings.moves == Moves::All
@@ -40,10 +51,10 @@ pub(super) fn mirror(
     if !is_wanted || attempt::unrolls(patch, settings, run) {
         return Ok(None);
     }
-    let mirror = mesh::mirror(&patch.mesh, &patch.polygon, run.progress)?;
+    let mirrored = look_for_mirror(patch, run)?;
     let may_stay_whole =
         || !attempt::comes_apart(patch, settings) && attempt::may_be_chart(patch.mesh.topology(), settings);
-    if mirror.is_some() && !is_large && may_stay_whole() {
+    if mirrored.is_some() && !is_large && may_stay_whole() {
         // What needs no cut gets none.
         let stretch_limit = Price::new(&patch.mesh, settings).limit(patch, settings);
         let worth_it = Settings { stretch_limit, ..settings.clone() };
@@ -51,7 +62,17 @@ pub(super) fn mirror(
             return Ok(None);
         }
     }
-    Ok(mirror)
+    Ok(mirrored)
+}
+
+fn look_for_mirror(patch: &Patch, run: &Run<'_>) -> Result<Option<Mirrored>, Cancelled> {
+    if let Some(mirror) = mesh::mirror(&patch.mesh, &patch.polygon, run.progress)? {
+        return Ok(Some(Mirrored { mirror, merged: None }));
+    }
+    let Some(label) = mesh::mirrored_polygons(&patch.mesh, &patch.polygon, run.progress)? else { return Ok(None) };
+    let merged = Merged::new(patch, &label);
+    let mirror = mesh::mirror(&merged.whole.mesh, &merged.whole.polygon, run.progress)?;
+    Ok(mirror.map(|mirror| Mirrored { mirror, merged: Some(merged) }))
 }
 
 /// How the half of a patch is charted, given with the names of its faces.
@@ -59,6 +80,20 @@ pub(super) type OfHalf<'a> = dyn Fn(&Patch, &[FaceId], &Settings) -> Result<(Vec
 
 /// The charts of a mirrored patch; `None` where the images of charts are none, since polygons there are divided into other triangles.
 pub(super) fn charts(
+    patch: &Patch,
+    mirrored: &Mirrored,
+    is_large: bool,
+    settings: &Settings,
+    of_half: &OfHalf<'_>,
+    run: &Run<'_>,
+) -> Result<Option<(Vec<Chart>, Rungs)>, Cancelled> {
+    let Mirrored { mirror, merged } = mirrored;
+    let Some(merged) = merged else { return by_halves(patch, mirror, is_large, settings, of_half, run) };
+    let made = by_halves(&merged.whole, mirror, is_large, settings, of_half, run)?;
+    Ok(made.map(|(charts, rungs)| (charts.iter().map(|chart| merged.chart_of(patch, chart)).collect(), rungs)))
+}
+
+fn by_halves(
     whole: &Patch,
     mirror: &Mirror,
     is_large: bool,
@@ -86,7 +121,7 @@ pub(super) fn charts(
     }
     let mut cutting = Cutting::new(mesh, polygon, charts);
     let zip = Zip { limit: settings.stretch_limit };
-    let moves = [&Join { which: Which::EVERY } as &dyn Move, &PartialJoin::MostSeen, &zip];
+    let moves = [&Join { which: Which::EVERY, alone: MOST_ALONE } as &dyn Move, &PartialJoin::MostSeen, &zip];
     let moves = moves.map(|inner| InPlane { inner, mirror, embeds: !is_large });
     let moves: Vec<&dyn Move> = moves.iter().map(|made| made as &dyn Move).collect();
     rungs.take(Rung::Mirrored);
@@ -123,6 +158,11 @@ impl Move for InPlane<'_> {
     // They were divided for the sake of symmetry, not because they unroll.
     fn price(&self, usual: Price) -> Price {
         usual.bending()
+    }
+
+    // Which side of a tube stays open is for stretch to say, too.
+    fn takes_cheapest(&self) -> bool {
+        self.kind() == MoveKind::Join
     }
 
     fn sites(&self, cutting: &Cutting<'_>, history: &History, price: &Price) -> Vec<Site> {

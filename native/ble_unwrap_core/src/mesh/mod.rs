@@ -18,6 +18,7 @@ mod likeness;
 pub(crate) mod measure;
 mod mirror;
 mod orient;
+mod other_diagonals;
 mod quad;
 #[cfg(test)]
 pub(crate) mod test_surfaces;
@@ -35,5 +36,6 @@ pub(crate) use index::{FaceId, HalfedgeId, VertexId};
 pub use input::{MeshError, MeshInput};
 pub(crate) use likeness::{Likeness, Shape};
 pub(crate) use mirror::{Mirror, Plane, mirror};
+pub(crate) use other_diagonals::mirrored_polygons;
 pub(crate) use quad::{Quad, is_convex};
 pub(crate) use tri_mesh::{Topology, TriMesh};

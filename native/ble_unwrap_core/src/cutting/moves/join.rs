@@ -89,7 +89,7 @@ pub(crate) fn join(
             history.exclude(MoveKind::Join, Place::between(a, b));
         }
     }
-    let moves: [&dyn Move; 2] = [&Join { which }, &JoinAnew { which, refused: &refused }];
+    let moves: [&dyn Move; 2] = [&Join { which, alone: 1 }, &JoinAnew { which, refused: &refused }];
     search(&mut cutting, &mut history, &moves, settings, rungs, run)?;
     Ok(cutting.into_charts())
 }
@@ -97,6 +97,8 @@ pub(crate) fn join(
 /// Two charts as they lie, glued along their border.
 pub(crate) struct Join {
     pub(crate) which: Which,
+    /// Where their border has several runs, so many of them are tried alone, those that cost most first.
+    pub(crate) alone: usize,
 }
 
 impl Move for Join {
@@ -113,19 +115,19 @@ impl Move for Join {
         })
     }
 
-    /// Glued all along their border; where that has several runs, also along the longest alone, and open along the others.
+    /// Glued all along their border; where that has several runs, also along single ones that cost most, and open along the others.
     fn ways(&self, cutting: &Cutting<'_>, site: &Site, _run: &Run<'_>) -> Result<Vec<Proposal>, Cancelled> {
         let [a, b] = site.charts[..] else { return Ok(Vec::new()) };
         let mesh = cutting.mesh();
-        let runs: Vec<Vec<HalfedgeId>> =
+        let mut runs: Vec<Vec<HalfedgeId>> =
             border::runs(cutting, a, |other| other == b).into_iter().map(|run| run.edges).collect();
-        let length = |run: &[HalfedgeId]| run.iter().map(|&h| mesh.edge_length(h)).sum::<f64>();
-        let longest = runs.iter().max_by(|s, t| length(s).total_cmp(&length(t)).then(t[0].cmp(&s[0])));
-        let Some(longest) = longest else { return Ok(Vec::new()) };
+        let cost = |run: &[HalfedgeId]| run.iter().map(|&h| cutting.seam_length(h)).sum::<f64>();
+        runs.sort_by(|s, t| cost(t).total_cmp(&cost(s)).then(s[0].cmp(&t[0])));
         let mut ways = vec![runs.concat()];
         if runs.len() > 1 {
-            ways.push(longest.clone());
+            ways.extend(runs.into_iter().take(self.alone));
         }
+        ways.retain(|way| !way.is_empty());
         let proposal = |glue: Vec<HalfedgeId>| Proposal {
             edit: Edit::new(mesh, &glue, &[]),
             start: Start::Glued(Some((b, border::alignment(cutting, &glue)))),
@@ -248,7 +250,7 @@ mod tests {
             assert_eq!(crate::stretch::first_flip(&chart.patch.mesh, &chart.uv), None);
         }
         let cutting = Cutting::new(&mesh, &polygon, charts.clone());
-        let join = Join { which: Which::EVERY };
+        let join = Join { which: Which::EVERY, alone: 1 };
         let site = join.sites(&cutting, &History::default(), &Price::new(&mesh, &settings)).pop().expect("neighbours");
         let lying = tried(&cutting, &join, &site, None, &settings, &run).expect("not cancelled").0;
         assert!(matches!(lying, Verdict::BadStart));
@@ -306,7 +308,7 @@ mod tests {
         for stretch_price in [0.0, 20.0] {
             let settings = Settings { stretch_price, ..Settings::default() };
             let price = Price::new(&ball, &settings);
-            let site = Join { which }.sites(&cutting, &History::default(), &price).pop().expect("neighbours");
+            let site = Join { which, alone: 1 }.sites(&cutting, &History::default(), &price).pop().expect("neighbours");
             let anew = JoinAnew { which, refused: &none };
             let joined = tried(&cutting, &anew, &site, Some(&price), &settings, &run).expect("not cancelled").0;
             // The chart that it saves is worth the seam, but not what the union is stretched, where that has a price.

@@ -67,7 +67,12 @@ pub(super) trait Move: Sync {
     /// Where it may be made, best first. A site that has been refused often enough is none, so that the search ends.
     fn sites(&self, cutting: &Cutting<'_>, history: &History, price: &Price) -> Vec<Site>;
 
-    /// What is to be tried at a site, in this order, until something does.
+    /// Whether the cheapest of what comes of all that is to be tried at a site is made, not the first that is worth it.
+    fn takes_cheapest(&self) -> bool {
+        false
+    }
+
+    /// What is to be tried at a site, in this order, until something does, or all of it.
     ///
     /// # Errors
     /// The caller cancelled, or there is not enough memory.
