@@ -25,7 +25,8 @@ use prepared::Prepared;
 ///
 /// Guaranteed for every result, checked exactly on the final single-precision values, and proven by its
 /// [`Certificate`](crate::Certificate): each face whose vertices are all finite lies in exactly one chart; no triangle is
-/// flipped or without area; no chart overlaps itself or another; charts keep the margin. Where this cannot be proven, the
+/// flipped or without area; no chart overlaps itself or another; charts keep the margin. With [`Settings::stack`] charts of like
+/// parts lie on each other instead, exactly, and the triangles of a mirrored one are all turned over there. Where this cannot be proven, the
 /// call fails.
 ///
 /// Every chart has an L2 stretch within `settings.stretch_limit`, or is listed in the report (a single polygon, which is
