@@ -17,9 +17,10 @@ pub struct Atlas {
     pub uv: Vec<[f32; 2]>,
     /// The chart of each input face, numbered from 0; −1 for faces that are not mapped.
     pub chart: Vec<i32>,
-    /// For each chart the stack that it belongs to, numbered from 0 in the order of their first charts; −1 for charts that lie alone, as all do unless
-    /// [`Settings::stack`](crate::Settings::stack) says otherwise. Charts of a stack cover exactly the same place, and their vertices have the same UVs to the bit;
-    /// those that are mirror images of the first are mirrored as a whole.
+    /// For each chart the stack that it belongs to, numbered from 0 in the order of their first charts; −1 for charts
+    /// that lie alone, as all do unless [`Settings::stack`](crate::Settings::stack) says otherwise. Charts of a stack
+    /// cover exactly the same place, and their vertices have the same UVs to the bit. Where some are mirror images of
+    /// others, those that are fewer are mirrored as wholes.
     pub stack: Vec<i32>,
     /// Measures of the result.
     pub report: Report,

@@ -9,8 +9,8 @@ use crate::metrics::Measures;
 pub struct Report {
     /// Number of charts.
     pub charts: usize,
-    /// Number of charts that share their place in the texture with others, as [`Settings::stack`](crate::Settings::stack) asks for;
-    /// [`Atlas::stack`](crate::Atlas::stack) says which.
+    /// Number of charts that share their place in the texture with others, as
+    /// [`Settings::stack`](crate::Settings::stack) asks for; [`Atlas::stack`](crate::Atlas::stack) says which.
     pub stacked: usize,
     /// Number of places that these charts share.
     pub stacks: usize,

@@ -21,10 +21,12 @@ use crate::unwrap::{MeshArrays, Wishes};
 /// uv : (c, 2) float32 or float64
 ///     A UV for each corner; rounded to float32.
 /// chart : (f,) int32 or int64, optional
-///     Negative for faces without UVs. Charts themselves are found from the UVs; with ``stacks``, faces of one chart belong together.
+///     Negative for faces without UVs. Charts themselves are found from the UVs; with ``stacks``, faces of one chart
+///     belong together.
 /// stacks : (k,) int32 or int64, optional
-///     For each chart of ``chart``, which is needed then, a number that charts share which lie on each other on purpose; negative for those that lie
-///     alone. ``Atlas.stack`` is one. What is meant so is no overlap, needs no margin, and covers the place of one chart.
+///     For each chart of ``chart``, which is needed then, a number that charts share which lie on each other on
+///     purpose; negative for those that lie alone. ``Atlas.stack`` is one. What is meant so is no overlap, needs no
+///     margin, and covers the place of one chart.
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
 /// weld, weld_distance : bool, float or None

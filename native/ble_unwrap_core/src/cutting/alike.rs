@@ -16,7 +16,8 @@ use crate::settings::{LimitOver, Moves, Settings, Stack, Symmetry};
 use super::copied::copied;
 use super::state::Cutting;
 
-/// Charting components of fewer faces takes no longer than comparing them. They are compared only where like ones are to be stacked, as leaves are.
+/// Charting components of fewer faces takes no longer than comparing them. They are compared only where like ones are
+/// to be stacked, as leaves are.
 const LEAST_FACES: usize = 8;
 /// A component is compared with so many others at most that look the same by their numbers.
 const MOST_COMPARED: usize = 8;
@@ -158,8 +159,8 @@ fn likeness_in(
     }
 }
 
-/// The first of some components that another one is like, wherever both are, with the first of the given orientations (whether it is
-/// mirrored) that there is.
+/// The first of some components that another one is like, wherever both are, with the first of the given orientations
+/// (whether it is mirrored) that there is.
 fn first_like(
     originals: &[(usize, Placed)],
     own: &Placed,

@@ -56,9 +56,10 @@ pub(crate) use touch_up::touch_up;
 /// The charts of a component, and how they came about.
 type Made = (Vec<Chart>, Rungs);
 
-/// Cuts a surface into charts under the stretch limit of `settings`, sorted by lowest face. `components` holds the faces of
-/// each connected piece, ascending, `positions` says where the vertices of different pieces are beside each other, in units of the mesh,
-/// and `visibility` how far each vertex can be seen, where that matters. Where charts are to be stacked, tells what is a copy of what, too.
+/// Cuts a surface into charts under the stretch limit of `settings`, sorted by lowest face. `components` holds the
+/// faces of each connected piece, ascending, `positions` says where the vertices of different pieces are beside each
+/// other, in units of the mesh, and `visibility` how far each vertex can be seen, where that matters. Where charts are
+/// to be stacked, tells what is a copy of what, too.
 ///
 /// # Errors
 /// The caller cancelled, or there is not enough memory.
@@ -160,7 +161,8 @@ pub(crate) fn cut(
     Ok((charts, rungs, originals))
 }
 
-/// What is a copy of what: of components, and where mirrored halves are to be stacked of the halves of those that were charted so.
+/// What is a copy of what: of components, and where mirrored halves are to be stacked of the halves of those that were
+/// charted so.
 fn originals_of(
     face_count: usize,
     components: &Groups<FaceId>,

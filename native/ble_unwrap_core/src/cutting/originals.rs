@@ -1,8 +1,8 @@
 //! What is a copy of what, so that charts of like parts can be laid on each other.
 //!
-//! Charts change on their way from here to the texture: some are cut across, some are made anew after rounding. So what is kept are not pairs of charts
-//! but pairs of places on the surface, side by side. Charts whose polygons are copies of the same ones, and are cut along the copies of the
-//! same sides, have the same description.
+//! Charts change on their way from here to the texture: some are cut across, some are made anew after rounding. So what
+//! is kept are not pairs of charts but pairs of places on the surface, side by side. Charts whose polygons are copies
+//! of the same ones, and are cut along the copies of the same sides, have the same description.
 
 use crate::charts::Chart;
 use crate::mesh::{FaceId, Groups, HalfedgeId, Mirror};
@@ -18,8 +18,8 @@ pub(crate) struct Originals {
     is_mirrored: Vec<bool>,
     /// Whether each face belongs to a component that is a copy or has copies, or that was charted by halves.
     has_like: Vec<bool>,
-    /// For sides in the second half of a component that was charted by halves, their images in the first half; none elsewhere. Empty where halves are not to be
-    /// stacked.
+    /// For sides in the second half of a component that was charted by halves, their images in the first half; none
+    /// elsewhere. Empty where halves are not to be stacked.
     in_first_half: Vec<HalfedgeId>,
 }
 
@@ -35,8 +35,8 @@ pub(crate) struct DescribedSide {
 /// What a chart is a copy of.
 #[derive(Clone, Debug)]
 pub(crate) struct Described {
-    /// Its sides, ascending, and the half-edge of the chart's mesh that each one is. Two charts with the same sides have the same polygons, cut in the same
-    /// way.
+    /// Its sides, ascending, and the half-edge of the chart's mesh that each one is. Two charts with the same sides
+    /// have the same polygons, cut in the same way.
     pub(crate) sides: Vec<(DescribedSide, HalfedgeId)>,
     /// Whether it is the mirror image of what these sides belong to.
     pub(crate) is_mirrored: bool,
@@ -140,7 +140,7 @@ mod tests {
 
     use super::*;
     use crate::charts::Patch;
-    use crate::mesh::{self, Likeness, Shape, TriMesh, test_surfaces};
+    use crate::mesh::{self, Likeness, Shape, TriMesh, VertexId, test_surfaces};
     use crate::progress::Progress;
 
     /// Three sheets without symmetry beside each other, the last one mirrored, as one surface: 12 quads each.
@@ -153,7 +153,7 @@ mod tests {
             let height = |p: &Point3<f64>| 0.1 * p.x * p.x + 0.05 * p.y.powi(3) + 0.1 * (p.x * p.y).sin();
             let place = |p: &Point3<f64>| Point3::new(side * p.x + 20.0 * f64::from(sheet), p.y, height(p));
             positions.extend(flat.positions().iter().map(place));
-            let named = |t: &[crate::mesh::VertexId; 3]| {
+            let named = |t: &[VertexId; 3]| {
                 let [a, b, c] = t.map(|v| first + v.index() as u32);
                 if sheet == 2 { [a, c, b] } else { [a, b, c] }
             };

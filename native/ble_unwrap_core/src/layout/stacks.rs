@@ -1,8 +1,9 @@
 //! Charts that lie on each other in the texture.
 //!
-//! Which charts are copies of each other is known from how they came about ([`Originals`]), also where they have been cut across or made anew since.
-//! One chart of each stack is packed and rounded, and the others take its UVs, vertex by vertex. A chart that would be turned over somewhere by them,
-//! because its polygons are divided into other triangles, or too stretched, gets a place of its own.
+//! Which charts are copies of each other is known from how they came about ([`Originals`]), also where they have been
+//! cut across or made anew since. One chart of each stack is packed and rounded, and the others take its UVs, vertex by
+//! vertex. A chart that would be turned over somewhere by them, because its polygons are divided into other triangles,
+//! or too stretched, gets a place of its own.
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,7 +21,8 @@ use crate::stretch;
 
 /// What lies on another chart may be stretched by so much more than where it lay: copies are alike to a thousandth.
 const MOST_RISE: f64 = 1e-2;
-/// Of charts with the same description, those that do not lie on the first are tried on so many others. There are hardly ever any.
+/// Of charts with the same description, those that do not lie on the first are tried on so many others. There are
+/// hardly ever any.
 const MOST_BASES: usize = 4;
 
 /// How a chart lies on another.
@@ -78,7 +80,8 @@ impl Stacks {
         Ok(Self { lying })
     }
 
-    /// The stack that each chart belongs to, numbered from 0 in the order of their first charts; −1 for charts that lie alone.
+    /// The stack that each chart belongs to, numbered from 0 in the order of their first charts; −1 for charts that lie
+    /// alone.
     pub(super) fn numbers(&self) -> Vec<i32> {
         let mut base: Vec<Option<usize>> = self.lying.iter().map(|lying| Some(lying.as_ref()?.on)).collect();
         for lying in self.lying.iter().flatten() {

@@ -92,8 +92,9 @@ pub struct Measures {
     /// Number of triangles whose orientation in UV differs from that of most of their chart (by area on the surface), once
     /// the triangles of the chart have been oriented consistently on the surface.
     pub flips: usize,
-    /// Number of pairs of triangles that share more than 1e-9 of the area of the layout's bounding box. Pairs of different charts of one stack are not counted,
-    /// and of triangles of one stack that are the same one stands for all.
+    /// Number of pairs of triangles that share more than 1e-9 of the area of the layout's bounding box. Pairs of
+    /// different charts of one stack are not counted, and of triangles of one stack that are the same one stands for
+    /// all.
     pub overlaps: u64,
     /// Number of those pairs whose triangles are in different islands.
     pub overlaps_between: u64,
@@ -105,12 +106,13 @@ pub struct Measures {
     pub seam_length_absolute: f64,
     /// Number of tiles in which triangles lie; 0 if one lies in none of those that there are.
     pub tiles: usize,
-    /// Share of the tiles in which triangles lie, or of the unit square if there is only one tile, that is covered; for a layout outside of all tiles,
-    /// share of its bounding square. A stack covers what its largest chart does. Area that a pair of triangles covers twice is subtracted once for each pair, so the value means nothing if
+    /// Share of the tiles in which triangles lie, or of the unit square if there is only one tile, that is covered; for
+    /// a layout outside of all tiles, share of its bounding square. A stack covers what its largest chart does. Area
+    /// that a pair of triangles covers twice is subtracted once for each pair, so the value means nothing if
     /// `overlaps_complete` is false.
     pub packing_efficiency: f64,
-    /// Least distance in texels between two islands that are not of one stack; 0 if boundaries cross. A distance above eight texels and above twice
-    /// the margin is given as the larger of these two values.
+    /// Least distance in texels between two islands that are not of one stack; 0 if boundaries cross. A distance above
+    /// eight texels and above twice the margin is given as the larger of these two values.
     pub gap_texels: f64,
     /// False if there was too much to search. The gap is then an upper bound.
     pub gap_complete: bool,
@@ -250,8 +252,8 @@ fn covered_once(mesh: &UvMesh, faces: &[FaceMeasures], topology: &UvTopology) ->
     (alone + largest.values().sum::<f64>()) * 0.5
 }
 
-/// Triangles that are the same in UV as one of another island of their stack with a lower number: hundreds of copies of a triangle would be tens of thousands
-/// of pairs.
+/// Triangles that are the same in UV as one of another island of their stack with a lower number: hundreds of copies of
+/// a triangle would be tens of thousands of pairs.
 fn repeated(mesh: &UvMesh, uv: &[[[f64; 2]; 3]], topology: &UvTopology) -> Vec<usize> {
     let stacked = |f: usize| {
         let stack = mesh.stack(mesh.label(f)).filter(|_| topology.chart[f] != NONE)?;

@@ -101,8 +101,8 @@ impl<'a> UvMesh<'a> {
         Ok(Self { positions, triangles, uv, corner_triangles, chart, stack: &[], texture })
     }
 
-    /// The same, with charts that lie on each other on purpose: `stack` holds, for each label from 0 on, a number that the labels of one stack share; charts with
-    /// a negative number, and with a label beyond the list, lie alone.
+    /// The same, with charts that lie on each other on purpose: `stack` holds, for each label from 0 on, a number that
+    /// the labels of one stack share; charts with a negative number, and with a label beyond the list, lie alone.
     #[must_use]
     pub(crate) fn with_stacks(self, stack: &'a [i32]) -> Self {
         Self { stack, ..self }

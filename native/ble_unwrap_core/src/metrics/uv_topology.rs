@@ -11,9 +11,9 @@ pub(crate) const NONE: u32 = u32::MAX;
 
 /// What belongs together in a layout.
 ///
-/// Corners at the same mesh vertex with the same float32 UV are one UV vertex, unless they are of different charts that lie in a stack. Two triangles are in
-/// one *chart* if they share a mesh edge with the same UV vertices at both ends; charts that share a
-/// UV vertex are one *island*.
+/// Corners at the same mesh vertex with the same float32 UV are one UV vertex, unless they are of different charts that
+/// lie in a stack. Two triangles are in one *chart* if they share a mesh edge with the same UV vertices at both ends;
+/// charts that share a UV vertex are one *island*.
 pub(crate) struct UvTopology {
     /// Chart of each triangle, numbered by lowest triangle; [`NONE`] where it has no finite UV.
     pub(crate) chart: Vec<u32>,

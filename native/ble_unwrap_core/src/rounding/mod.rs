@@ -135,7 +135,8 @@ pub(crate) fn round_to_f32(
     }
 }
 
-/// The triangles of a chart that do not have a strictly positive area with these UVs, or, of a mirror image, a strictly negative one. Exact. O(n).
+/// The triangles of a chart that do not have a strictly positive area with these UVs, or, of a mirror image, a strictly
+/// negative one. Exact. O(n).
 ///
 /// # Panics
 /// If `uv` does not hold one UV a vertex.

@@ -97,12 +97,13 @@ pub struct LayoutMeasures {
 /// face, which is negative for faces without UVs.
 ///
 /// Faces are triangulated as [`unwrap`](crate::unwrap()) does it: by `input.corner_triangles` where they cover a face.
-/// Charts are found from the UVs; `chart` only tells which faces have UVs, and which belong together where `stack` is not empty. It then holds one number for
-/// each chart, as [`Atlas::stack`](crate::Atlas::stack) does: charts with the same number, which is at least 0, lie on each other on purpose. Their overlaps are
-/// not counted, they need keep no margin, each stack covers the place of its largest chart, and they are different charts also where a chart
-/// and its mirror image meet. Whether they lie exactly on each other is for [`certify`] to say. Of the settings, only those of welding and of
-/// the texture matter. If a mesh repeats its vertices along its seams, then without `settings.weld` the seams count as
-/// boundary of the mesh, and their length is not measured.
+/// Charts are found from the UVs; `chart` only tells which faces have UVs, and which belong together where `stack` is
+/// not empty. It then holds one number for each chart, as [`Atlas::stack`](crate::Atlas::stack) does: charts with the
+/// same number, which is at least 0, lie on each other on purpose. Their overlaps are not counted, they need keep no
+/// margin, each stack covers the place of its largest chart, and they are different charts also where a chart and its
+/// mirror image meet. Whether they lie exactly on each other is for [`certify`] to say. Of the settings, only those of
+/// welding and of the texture matter. If a mesh repeats its vertices along its seams, then without `settings.weld` the
+/// seams count as boundary of the mesh, and their length is not measured.
 ///
 /// UVs are measured in the proportions of the texture, so a layout for a 2:1 texture that shows no distortion on the
 /// surface has none here either. One unit of UV is the width and height of the texture in texels, even where the layout
@@ -144,12 +145,13 @@ pub fn measure_layout(
 /// Checks a UV map exactly, whoever made it, by the same checks that [`unwrap`](crate::unwrap()) makes before it returns an
 /// atlas. `uv` holds one UV for each corner, and `chart` one number for each face, which is negative for faces without UVs.
 ///
-/// The certificate is [valid](Certificate::is_valid) if no triangle is turned over, no chart overlaps itself or another,
-/// all UVs lie in the unit square, or each chart in one of the tiles of the texture, and charts are at least the margin apart. `stack`, if it is not empty, holds
-/// a number for each chart, as for [`measure_layout`]: charts of one stack must lie exactly on each other instead, to the bit, and may be mirrored as wholes. Faces with the same number in `chart` are one
-/// chart. Faces are triangulated and consistently oriented as [`unwrap`](crate::unwrap()) does it. The certificate numbers
-/// the triangles made in this way, which are in the order of the faces. Of the settings, only those of welding and of the
-/// texture matter.
+/// The certificate is [valid](Certificate::is_valid) if no triangle is turned over, no chart overlaps itself or
+/// another, all UVs lie in the unit square, or each chart in one of the tiles of the texture, and charts are at least
+/// the margin apart. `stack`, if it is not empty, holds a number for each chart, as for [`measure_layout`]: charts of
+/// one stack must lie exactly on each other instead, to the bit, and may be mirrored as wholes. Faces with the same
+/// number in `chart` are one chart. Faces are triangulated and consistently oriented as [`unwrap`](crate::unwrap())
+/// does it. The certificate numbers the triangles made in this way, which are in the order of the faces. Of the
+/// settings, only those of welding and of the texture matter.
 ///
 /// All signs come from exact predicates, so there is no tolerance. The result is the same for any number of threads. O(n
 /// log n); less than a second for a million triangles.

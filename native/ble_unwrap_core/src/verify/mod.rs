@@ -31,10 +31,11 @@
 //!
 //! # Stacks
 //!
-//! Charts may lie on each other on purpose. Of each stack one chart goes through all of the above: the one with the lowest label whose triangle with the lowest number
-//! is positive. Each other one must
+//! Charts may lie on each other on purpose. Of each stack one chart goes through all of the above: the one with the
+//! lowest label whose triangle with the lowest number is positive. Each other one must
 //!
-//! 6. have only strictly positive triangles, or only strictly negative ones, if it is mirrored: its boundary chain is then taken the other way round;
+//! 6. have only strictly positive triangles, or only strictly negative ones, if it is mirrored: its boundary chain is
+//!    then taken the other way round;
 //! 7. have the same boundary chain as that one, edge by edge and to the bit.
 //!
 //! Then its winding numbers are those of that chart: it is as injective, and covers exactly the same place.
@@ -95,8 +96,8 @@ pub struct Certificate {
     /// Triangles with a corner that is outside the unit square or not finite; where the texture has several tiles, outside the tile in which the triangle
     /// of its chart with the lowest number lies, since a chart must not cross the border of a tile.
     pub out_of_range: Defect<u32>,
-    /// Triangles that are not strictly positive: they are turned over or have no area. Of a chart that lies on another in a stack, all are to be positive,
-    /// or all negative, as its triangle with the lowest number is.
+    /// Triangles that are not strictly positive: they are turned over or have no area. Of a chart that lies on another
+    /// in a stack, all are to be positive, or all negative, as its triangle with the lowest number is.
     pub flipped: Defect<u32>,
     /// Pairs of boundary edges of one chart that cross or touch, except where one follows the other. Each is named by the
     /// triangles of the two edges, the lower number first. A vertex that a boundary visits twice counts, too.
@@ -111,12 +112,14 @@ pub struct Certificate {
     pub bad_loops: Defect<i32>,
     /// Number of charts that share their place with others on purpose.
     pub stacked: usize,
-    /// Labels of the charts that do not cover exactly the same place as the chart of their stack that they are compared with.
+    /// Labels of the charts that do not cover exactly the same place as the chart of their stack that they are compared
+    /// with.
     pub apart: Defect<i32>,
     /// Labels of all charts that break a rule, in ascending order.
     pub faulty_charts: Vec<i32>,
-    /// Least distance in texels between the boundaries of different charts that are not of one stack. Unlike the checks, it is subject to rounding. A
-    /// distance above eight texels and above twice the margin is given as the larger of these two values.
+    /// Least distance in texels between the boundaries of different charts that are not of one stack. Unlike the
+    /// checks, it is subject to rounding. A distance above eight texels and above twice the margin is given as the
+    /// larger of these two values.
     pub gap_texels: f64,
     /// The margin: the value that `gap_texels` has to reach.
     pub margin_texels: f64,
@@ -156,7 +159,8 @@ impl fmt::Display for Certificate {
 }
 
 impl Certificate {
-    /// Whether the layout is proven to be injective but for its stacks, to lie in the unit square or its tiles and to keep the margin.
+    /// Whether the layout is proven to be injective but for its stacks, to lie in the unit square or its tiles and to
+    /// keep the margin.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         self.is_injective() && self.keeps_margin()
@@ -169,7 +173,8 @@ impl Certificate {
         self.complete && self.gap_texels >= self.margin_texels
     }
 
-    /// Whether the layout is proven to be injective, but for charts that lie exactly on another one of their stack, and to lie in the unit square or, chart by chart, in its tiles.
+    /// Whether the layout is proven to be injective, but for charts that lie exactly on another one of their stack, and
+    /// to lie in the unit square or, chart by chart, in its tiles.
     #[must_use]
     pub fn is_injective(&self) -> bool {
         self.complete

@@ -8,8 +8,8 @@ use crate::metrics::UvMesh;
 
 /// Which chart lies on which, by their places among the labels in ascending order.
 pub(super) struct Stacking {
-    /// The chart that each chart lies on: of its stack the first whose first triangle is positive, or just the first; its own place where it is that one or
-    /// lies alone.
+    /// The chart that each chart lies on: of its stack the first whose first triangle is positive, or just the first;
+    /// its own place where it is that one or lies alone.
     base: Vec<usize>,
     /// Number of charts that share their place with others.
     stacked: usize,
