@@ -75,7 +75,8 @@ def compare(objects, settings, *, angles=ANGLES, threads=0, progress=None):
         "use_selection": False,
         "uv_map": "ACTIVE",
         "use_original_bounds": False,
-        # Smart UV Project fills one texture.
+        # Smart UV Project fills one texture, and lays nothing on anything.
+        "stack": "OFF",
         "tiles": 1,
         "texel_density": 0.0,
     }

@@ -9,11 +9,20 @@ from . import engine, kept_analysis
 
 @dataclass
 class Result:
-    """One UV per corner and a chart per face of a mesh, or one of both per point of a cloud; and the native report."""
+    """One UV per corner and a chart per face of a mesh, or one of both per point of a cloud; and the native report.
+
+    `stack` has a number per chart that charts share which lie on each other; -1 for those that lie alone.
+    """
 
     uv: np.ndarray  # (c, 2) float32
     chart: np.ndarray  # (f,) int32; of a point that is in no chart: -1
     report: dict
+    stack: np.ndarray  # (k,) int32; of a cloud: empty
+
+    @property
+    def stacks(self):
+        """The charts and their stacks where some lie on each other, as `measurement.measure` takes them; else None."""
+        return (self.chart, self.stack) if (self.stack >= 0).any() else None
 
 
 def _mesh(selection, cut, follow):
@@ -40,7 +49,8 @@ def _caller(name, mesh, settings, keep):
 
 
 def _result(atlas):
-    return Result(np.asarray(atlas.uv, np.float32), np.asarray(atlas.chart, np.int32), dict(atlas.report))
+    uv, chart = np.asarray(atlas.uv, np.float32), np.asarray(atlas.chart, np.int32)
+    return Result(uv, chart, dict(atlas.report), np.asarray(getattr(atlas, "stack", ()), np.int32))
 
 
 def unwrap(selection, settings, *, cut=(), follow=(), keep=False):

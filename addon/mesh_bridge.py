@@ -302,14 +302,17 @@ def active_maps(selection):
     return [find_mesh(part).uv_layers.active.name for part in selection.parts]
 
 
-def write_uvs(selection, uv, *, target=ACTIVE_MAP, mark_seams=False):
+def write_uvs(selection, uv, *, target=ACTIVE_MAP, mark_seams=False, chart=None):
     """Writes one UV per corner to all parts, and returns what each mesh holds afterwards, a list of (c, 2) float32.
+
+    With `mark_seams` the borders of charts become seams; `chart` names the chart of each face, where UVs do not tell.
 
     Nothing is changed when any mesh is gone, edited or full. Only the corners of the selection are written; what is
     returned are those of the whole mesh.
     """
     uv = np.ascontiguousarray(uv, np.float32)
     meshes = check_parts(selection, target)
+    corner_chart = None if chart is None else np.repeat(chart, np.diff(selection.face_offsets))
     held = []
     with object_mode(meshes):
         for part, mesh in zip(selection.parts, meshes, strict=True):
@@ -322,10 +325,19 @@ def write_uvs(selection, uv, *, target=ACTIVE_MAP, mark_seams=False):
                 values[part.source_corners] = uv[part.corners]
             write_layer(mesh, layer_name, values)
             if mark_seams:
-                seams.mark_chart_borders(mesh, values, part.source_faces)
+                seams.mark_chart_borders(mesh, values, part.source_faces, _of_mesh(part, values, corner_chart))
             mesh.update()
             held.append(read_array(mesh.uv_layers[layer_name].uv, "vector", np.float32, 2))
     return held
+
+
+def _of_mesh(part, values, corner_chart):
+    """The charts of the corners of a part's whole mesh, which has `values`; -1 for those that are not in the part."""
+    if corner_chart is None or part.source_corners is None:
+        return corner_chart if corner_chart is None else corner_chart[part.corners]
+    whole = np.full(len(values), -1, np.int32)
+    whole[part.source_corners] = corner_chart[part.corners]
+    return whole
 
 
 def of_selection(selection, held):

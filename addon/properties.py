@@ -66,6 +66,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     texture_size: declared("texture_size", soft_min=256, soft_max=8192)
     margin: declared("margin", soft_max=32.0, step=50, precision=1, subtype="PIXEL")
     rotation: declared("rotation")
+    stack: declared("stack")
     quality: declared("quality")
     tiles: declared("tiles", soft_max=20)
     # Lengths are those of the scene, in its units: objects are unwrapped at the scale that they have there.
@@ -259,7 +260,7 @@ ADVANCED_SETTINGS = (
     ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max", "together_max")),
     ("Embedding", ("model", "kernel_width", "relaxation", "max_sweeps", "tolerance", "update", "initial")),
     ("Stretch", ("stretch_solver", "stretch_iterations")),
-    ("Packing", ("quality", "tiles", "texel_density")),
+    ("Packing", ("stack", "quality", "tiles", "texel_density")),
 )
 
 

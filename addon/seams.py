@@ -34,15 +34,16 @@ def _is_ours(attribute):
     return attribute is not None and (attribute.domain, attribute.data_type) == ("EDGE", "INT")
 
 
-def mark_chart_borders(mesh, uv, source_faces):
+def mark_chart_borders(mesh, uv, source_faces, chart=None):
     """Marks the edges at which the UVs of neighbouring faces differ as seams, in the place of those we marked before.
 
-    Of a mesh in object mode. With `source_faces`, only edges of these faces are looked at. One of our seams that the
+    Of a mesh in object mode. `chart` names the chart of each corner: halves that lie on each other have the same UVs
+    where they meet. With `source_faces`, only edges of these faces are looked at. One of our seams that the
     artist has cleared is not marked again, unless all of them were cleared, which is to begin anew.
     """
     seams, ours = read_array(mesh.edges, "use_seam", bool), remembered(mesh)
     looked_at = _edges_of(mesh, source_faces)
-    border = _chart_borders(mesh, uv) & looked_at
+    border = _chart_borders(mesh, uv, chart) & looked_at
     own_left = ours & seams
     cleared = ours & ~seams & (border | ~looked_at) if own_left.any() else np.zeros_like(ours)
     wished = seams & ~ours
@@ -74,8 +75,8 @@ def _edges_of(mesh, faces):
     return result
 
 
-def _chart_borders(mesh, uv):
-    """Edges where the UVs of two neighbouring faces differ, (e,) bool."""
+def _chart_borders(mesh, uv, chart):
+    """Edges where the UVs, or the charts, of two neighbouring faces differ, (e,) bool."""
     corner_vertices = read_corner_vertices(mesh)
     offsets = read_face_offsets(mesh)
     corner_edges = read_array(mesh.loops, "edge_index", np.int32)
@@ -88,6 +89,8 @@ def _chart_borders(mesh, uv):
     first = np.full(len(mesh.edges), -1, np.int32)
     first[corner_edges[::-1]] = np.arange(len(corner_edges) - 1, -1, -1, dtype=np.int32)
     differs = (ends != ends[first[corner_edges]]).any(axis=1)
+    if chart is not None:
+        differs |= chart != chart[first[corner_edges]]
     border = np.zeros(len(mesh.edges), bool)
     border[corner_edges[differs]] = True
     return border

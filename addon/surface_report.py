@@ -40,7 +40,7 @@ def _limited(measured, limit_over):
 def summary(measured, seconds=None):
     """One line about a measurement."""
     parts = [
-        counted(measured.get("charts"), "chart"),
+        counted(measured.get("charts"), "chart") + (f" ({text})" if (text := _stacks_text(measured)) else ""),
         f"stretch {number_text(measured.get('l2'))} (worst chart {number_text(measured.get('l2_worst_chart'))})",
         _overlaps_text(measured),
         counted(measured.get("flips"), "flip"),
@@ -66,6 +66,12 @@ def _overlaps_text(measured):
     if kept is None:
         return overlaps
     return f"{overlaps}, {f'{kept:,}' if kept else 'none'} with faces that were not unwrapped"
+
+
+def _stacks_text(measured):
+    """How many charts lie on each other, if any do."""
+    stacked = measured.get("stacked")
+    return f"{stacked:,} in {counted(measured.get('stacks'), 'stack')}" if stacked else ""
 
 
 def found(report):
@@ -98,6 +104,8 @@ def lines(certificate, *, margin, stretch_limit, limit_over="CHART", notes=(), l
         ("BAD" if overlaps else "WARN" if with_kept else "OK", _overlaps_text(measured)),
         ("BAD" if flips else "OK", counted(flips, "flipped face")),
     ]
+    if text := _stacks_text(measured):
+        result.insert(1, ("INFO", f"{text}: they share their pixels"))
     if charts > 1 and gap is not None:
         least = "≥ " if gap >= max(SEARCHED_TEXELS, 2 * margin) else ""
         result.append(("OK" if gap_ok else "BAD", f"Charts {least}{gap:.1f} px apart (margin {margin:g} px)"))

@@ -137,7 +137,9 @@ class UnwrapTask:
         """Writes a result to the meshes and judges what they hold afterwards."""
         self.timer.start()
         uv = placed(result.uv, self.bounds)
-        whole = mesh_bridge.write_uvs(self.selection, uv, target=self.target, mark_seams=self.settings["mark_seams"])
+        stacks = result.stacks
+        marks = {"mark_seams": self.settings["mark_seams"], "chart": stacks and stacks[0]}
+        whole = mesh_bridge.write_uvs(self.selection, uv, target=self.target, **marks)
         held = mesh_bridge.of_selection(self.selection, whole)
         margin = self.settings["margin"]
         limit = {name: self.settings[name] for name in ("stretch_limit", "limit_over")}
@@ -146,12 +148,12 @@ class UnwrapTask:
         if measure_again:
             given = {name: self.settings[name] for name in ("texture_size", "margin", "tiles", "weld", "weld_distance")}
             try:
-                measured = measurement.measure(self.selection, held, **given)
-                measured["texels_per_unit"] = result.report["texels_per_unit"]
+                measured = measurement.measure(self.selection, held, stacks=stacks, **given)
+                measured |= {name: result.report[name] for name in ("texels_per_unit", "stacked", "stacks")}
             except engine.EngineError as error:  # the UVs are written: say what is known
                 warnings.append(f"The written UVs could not be measured: {error}")
         if kept := mesh_bridge.kept_faces(self.selection, whole):
-            overlaps = self._overlaps(held, kept)
+            overlaps = self._overlaps(held, kept, stacks)
             measured = {**measured, "overlaps_with_kept": overlaps}
             if overlaps:
                 warnings.append(
@@ -171,14 +173,14 @@ class UnwrapTask:
             maps=mesh_bridge.active_maps(self.selection),
         )
 
-    def _overlaps(self, held, kept):
+    def _overlaps(self, held, kept, stacks):
         """Pairs of triangles, one unwrapped and one kept, that share area in the UV map."""
         chosen = self.selection
         triangles = chosen.corner_triangles
         if triangles is None:
             triangles = np.arange(len(chosen.corner_vertices), dtype=np.int32).reshape(-1, 3)
         unwrapped = (chosen.positions, chosen.corner_vertices, chosen.face_offsets, triangles, held)
-        return measurement.overlaps_between(unwrapped, kept)
+        return measurement.overlaps_between(unwrapped, kept, stacks)
 
 
 @dataclass

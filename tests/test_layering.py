@@ -217,6 +217,7 @@ CUTTING = [
     {"whole", "atlas_limit"},
     {"level/carry", "level/prolong", "level/mod"},
     {"symmetric", "alike"},
+    {"originals"},
     {"component"},
     {"mod"},
 ]

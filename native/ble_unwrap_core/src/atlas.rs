@@ -17,6 +17,11 @@ pub struct Atlas {
     pub uv: Vec<[f32; 2]>,
     /// The chart of each input face, numbered from 0; −1 for faces that are not mapped.
     pub chart: Vec<i32>,
+    /// For each chart the stack that it belongs to, numbered from 0 in the order of their first charts; −1 for charts
+    /// that lie alone, as all do unless [`Settings::stack`](crate::Settings::stack) says otherwise. Charts of a stack
+    /// cover exactly the same place, and their vertices have the same UVs to the bit. Where some are mirror images of
+    /// others, those that are fewer are mirrored as wholes.
+    pub stack: Vec<i32>,
     /// Measures of the result.
     pub report: Report,
     /// The outcome of the exact checks of `uv`, which is [valid](Certificate::is_valid).
@@ -31,11 +36,12 @@ impl Atlas {
     pub(crate) fn proven(
         uv: Vec<[f32; 2]>,
         chart: Vec<i32>,
+        stack: Vec<i32>,
         report: Report,
         certificate: Certificate,
     ) -> Result<Self, UnwrapError> {
         if certificate.is_valid() {
-            Ok(Self { uv, chart, report, certificate })
+            Ok(Self { uv, chart, stack, report, certificate })
         } else {
             Err(UnwrapError::Unproven(Box::new(certificate)))
         }
@@ -70,7 +76,7 @@ mod tests {
     }
 
     fn proven(certificate: Certificate) -> Result<Atlas, UnwrapError> {
-        Atlas::proven(Vec::new(), Vec::new(), Report::default(), certificate)
+        Atlas::proven(Vec::new(), Vec::new(), Vec::new(), Report::default(), certificate)
     }
 
     #[test]

@@ -83,9 +83,9 @@
 //! let square = [[0.2, 0.2], [0.6, 0.2], [0.6, 0.6], [0.2, 0.6]];
 //! let uv = [square, square].concat();
 //! let settings = Settings::default();
-//! let layout = measure_layout(&mesh, &uv, None, &settings, &Progress::new())?;
+//! let layout = measure_layout(&mesh, &uv, None, &[], &settings, &Progress::new())?;
 //! assert!((layout.measures.l2 - 1.0).abs() < 1e-6 && layout.measures.overlaps > 0);
-//! let certificate = certify(&mesh, &uv, &[0, 1], &settings, &Progress::new())?;
+//! let certificate = certify(&mesh, &uv, &[0, 1], &[], &settings, &Progress::new())?;
 //! assert!(!certificate.is_valid() && certificate.crossings_between.first.is_some());
 //! # Ok::<(), ble_unwrap_core::standalone::LayoutError>(())
 //! ```

@@ -9,6 +9,11 @@ use crate::metrics::Measures;
 pub struct Report {
     /// Number of charts.
     pub charts: usize,
+    /// Number of charts that share their place in the texture with others, as
+    /// [`Settings::stack`](crate::Settings::stack) asks for; [`Atlas::stack`](crate::Atlas::stack) says which.
+    pub stacked: usize,
+    /// Number of places that these charts share.
+    pub stacks: usize,
     /// Number of input faces, polygons counted once.
     pub faces: usize,
     /// Input faces without UVs.
@@ -32,7 +37,7 @@ pub struct Report {
     /// Number of quads that are convex on the surface but not in UV. A renderer that divides such a quad by one of its two
     /// diagonals draws a triangle that is turned over.
     pub bent_quads: usize,
-    /// Number of pairs of triangles that overlap.
+    /// Number of pairs of triangles that overlap, without those of charts that are stacked on each other.
     pub overlaps: u64,
     /// Length of the seams, divided by the square root of the surface area.
     pub seam_length: f64,

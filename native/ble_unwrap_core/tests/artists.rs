@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use ble_unwrap_core::settings::{Front, Settings, Style, Symmetry};
+use ble_unwrap_core::settings::{Front, Settings, Stack, Style, Symmetry};
 use ble_unwrap_core::{Atlas, MeshInput, Progress, unwrap};
 use ble_unwrap_fixtures::{PolyMesh, capped_cylinder, torus, uv_sphere, voxels, wrapped_grid};
 
@@ -143,6 +143,12 @@ fn parts_that_are_alike_get_the_same_map_as_quads_or_triangles() {
             let apart: f64 = area(part).iter().zip(&first).map(|(a, b)| (a - b).abs()).sum();
             assert!(apart < 0.01 * first.iter().sum::<f64>(), "part {part}: {apart}");
         }
+        assert_eq!((atlas.report.stacked, atlas.report.stacks), (0, 0));
+        let stacked = unwrapped(&all, &Settings { stack: Stack::Mirrored, ..Settings::default() });
+        let report = &stacked.report;
+        assert_eq!((report.charts, report.stacked), (atlas.report.charts, atlas.report.charts));
+        assert!(report.stacks <= report.charts / 4 && stacked.certificate.stacked == report.charts, "{report:?}");
+        assert!(report.texels_per_unit > 1.5 * atlas.report.texels_per_unit);
     }
 }
 

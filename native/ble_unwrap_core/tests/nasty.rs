@@ -33,9 +33,10 @@ fn judge(input: &MeshInput<'_>, settings: &Settings, atlas: &Atlas) -> Result<(C
     if let Some(p) = (0..polygons).find(|&p| finite(&input.face_offsets[p..p + 2]) != (atlas.chart[p] >= 0)) {
         return Err(format!("face {p} has chart {}", atlas.chart[p]));
     }
-    let certificate = certify(input, &atlas.uv, &atlas.chart, settings, &progress).map_err(|e| e.to_string())?;
-    let layout =
-        measure_layout(input, &atlas.uv, Some(&atlas.chart), settings, &progress).map_err(|e| e.to_string())?;
+    let certificate =
+        certify(input, &atlas.uv, &atlas.chart, &atlas.stack, settings, &progress).map_err(|e| e.to_string())?;
+    let layout = measure_layout(input, &atlas.uv, Some(&atlas.chart), &atlas.stack, settings, &progress)
+        .map_err(|e| e.to_string())?;
     Ok((certificate, layout.measures))
 }
 

@@ -108,9 +108,9 @@ fn measured(mesh: &PolyMesh, atlas: &Atlas, triangles: &[[i32; 3]], name: &str) 
     let flat = mesh.flat();
     let input = MeshInput { corner_triangles: Some(triangles), ..input_of(mesh, &flat) };
     let (settings, progress) = (Settings::default(), Progress::new());
-    let certificate = certify(&input, &atlas.uv, &atlas.chart, &settings, &progress).expect("valid arrays");
+    let certificate = certify(&input, &atlas.uv, &atlas.chart, &[], &settings, &progress).expect("valid arrays");
     assert!(certificate.is_valid(), "{name}: {certificate:?}");
-    let layout = measure_layout(&input, &atlas.uv, None, &settings, &progress).expect("measures");
+    let layout = measure_layout(&input, &atlas.uv, None, &[], &settings, &progress).expect("measures");
     assert_eq!((layout.bent_quads, layout.unmapped_faces), (0, 0), "{name}");
     layout.measures
 }

@@ -21,7 +21,12 @@ use crate::unwrap::{MeshArrays, Wishes};
 /// uv : (c, 2) float32 or float64
 ///     A UV for each corner; rounded to float32.
 /// chart : (f,) int32 or int64, optional
-///     Negative for faces without UVs. Charts themselves are found from the UVs.
+///     Negative for faces without UVs. Charts themselves are found from the UVs; with ``stacks``, faces of one chart
+///     belong together.
+/// stacks : (k,) int32 or int64, optional
+///     For each chart of ``chart``, which is needed then, a number that charts share which lie on each other on
+///     purpose; negative for those that lie alone. ``Atlas.stack`` is one. What is meant so is no overlap, needs no
+///     margin, and covers the place of one chart.
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
 /// weld, weld_distance : bool, float or None
@@ -63,7 +68,7 @@ use crate::unwrap::{MeshArrays, Wishes};
 ///
 /// Sander, Snyder, Gortler, Hoppe: Texture mapping progressive meshes, SIGGRAPH 2001.
 #[pyfunction]
-#[pyo3(signature = (positions, corner_vertices, face_offsets, uv, *, chart=None, corner_triangles=None, job=None, **settings))]
+#[pyo3(signature = (positions, corner_vertices, face_offsets, uv, *, chart=None, stacks=None, corner_triangles=None, job=None, **settings))]
 pub(crate) fn measure(
     py: Python<'_>,
     positions: &Bound<'_, PyAny>,
@@ -71,6 +76,7 @@ pub(crate) fn measure(
     face_offsets: &Bound<'_, PyAny>,
     uv: &Bound<'_, PyAny>,
     chart: Option<&Bound<'_, PyAny>>,
+    stacks: Option<&Bound<'_, PyAny>>,
     corner_triangles: Option<&Bound<'_, PyAny>>,
     job: Option<Bound<'_, Job>>,
     settings: Option<&Bound<'_, PyDict>>,
@@ -79,11 +85,13 @@ pub(crate) fn measure(
     let mesh = MeshArrays::new(positions, corner_vertices, face_offsets, corner_triangles, Wishes::default())?;
     let uv = arrays::single_rows(uv, Argument { name: "uv", shape: "(c, 2)" })?;
     let chart = chart.map(|given| arrays::indices(given, Argument { name: "chart", shape: "(f,)" })).transpose()?;
+    let stacks = stacks.map(|given| arrays::indices(given, Argument { name: "stacks", shape: "(k,)" })).transpose()?;
     let job = Job::given_or_new(py, job)?;
     job.get().start(
         call.threads,
         move |progress| {
-            measure_layout(&mesh.input(), &uv, chart.as_deref(), &call.settings, progress).map_err(Failure::from)
+            let (chart, stack) = (chart.as_deref(), stacks.as_deref().unwrap_or_default());
+            measure_layout(&mesh.input(), &uv, chart, stack, &call.settings, progress).map_err(Failure::from)
         },
         |py, layout| Ok(report::measures_to_dict(py, layout)?.into_any().unbind()),
     )?;

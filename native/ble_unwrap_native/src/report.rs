@@ -9,6 +9,8 @@ use pyo3::types::PyDict;
 pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyDict>> {
     let Report {
         charts,
+        stacked,
+        stacks,
         faces,
         unmapped_faces,
         l2,
@@ -37,6 +39,8 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'
     } = report;
     let dict = PyDict::new(py);
     dict.set_item("charts", charts)?;
+    dict.set_item("stacked", stacked)?;
+    dict.set_item("stacks", stacks)?;
     dict.set_item("faces", faces)?;
     dict.set_item("unmapped_faces", unmapped_faces)?;
     dict.set_item("l2", l2)?;
@@ -75,6 +79,8 @@ pub(crate) fn certificate_to_dict<'py>(py: Python<'py>, certificate: &Certificat
         crossings_between,
         nested,
         bad_loops,
+        stacked,
+        apart,
         faulty_charts,
         gap_texels,
         margin_texels,
@@ -91,6 +97,8 @@ pub(crate) fn certificate_to_dict<'py>(py: Python<'py>, certificate: &Certificat
     dict.set_item("crossings_between", crossings_between.count)?;
     dict.set_item("nested", nested.count)?;
     dict.set_item("bad_loops", bad_loops.count)?;
+    dict.set_item("stacked", stacked)?;
+    dict.set_item("apart", apart.count)?;
     dict.set_item("faulty_charts", faulty_charts)?;
     dict.set_item("gap_texels", gap_texels)?;
     dict.set_item("margin_texels", margin_texels)?;

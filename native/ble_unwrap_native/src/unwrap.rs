@@ -20,37 +20,43 @@ use crate::settings;
 ///     A UV in [0, 1]² for each corner, or in the square of a further tile; (0, 0) at corners of faces without a chart.
 /// chart : Array, (f,) int32
 ///     The chart of each face, from 0; -1 for faces that have a vertex with non-finite coordinates.
+/// stack : Array, (k,) int32
+///     The stack of each of the k charts, from 0; -1 for charts that lie alone, as all do with ``stack="off"``. Charts of
+///     one stack cover exactly the same place, with the same UVs to the bit. Where some are mirror images of others, those
+///     that are fewer are mirrored as wholes.
 /// report : dict
 ///     Measures of the result, taken from ``uv`` as it stands; see ``unwrap``.
 /// certificate : dict
-///     The outcome of the exact checks of ``uv``. ``valid`` is true, as ``unwrap`` raises ``UnprovenError`` otherwise: nothing
-///     is ``flipped``, ``out_of_range``, crosses (``crossings_inside``, ``crossings_between``) or is ``nested``, each chart has
-///     one outer boundary (``bad_loops``), and ``gap_texels`` is at least ``margin_texels``.
+///     The outcome of the exact checks of ``uv``. ``valid`` is true, as ``unwrap`` raises ``UnprovenError`` otherwise:
+///     nothing is ``flipped``, ``out_of_range``, crosses (``crossings_inside``, ``crossings_between``) or is
+///     ``nested``, each chart has one outer boundary (``bad_loops``), and ``gap_texels`` is at least ``margin_texels``.
+///     The ``stacked`` charts are left out of that but for one of each stack, and the others cover exactly the same
+///     place (none is ``apart``), all of their triangles turned one way.
 #[pyclass(frozen, get_all, module = "ble_unwrap_native")]
 pub(crate) struct Atlas {
     uv: Py<Array>,
     chart: Py<Array>,
+    stack: Py<Array>,
     report: Py<PyDict>,
     certificate: Py<PyDict>,
 }
 
 /// What an [`Atlas`] is made of.
-type Parts = (Py<Array>, Py<Array>, Py<PyDict>, Py<PyDict>);
+type Parts = (Py<Array>, Py<Array>, Py<Array>, Py<PyDict>, Py<PyDict>);
 
 #[pymethods]
 impl Atlas {
     #[new]
-    #[pyo3(signature = (uv, chart, report, certificate, /))]
-    fn new(uv: Py<Array>, chart: Py<Array>, report: Py<PyDict>, certificate: Py<PyDict>) -> Self {
-        Self { uv, chart, report, certificate }
+    #[pyo3(signature = (uv, chart, stack, report, certificate, /))]
+    fn new(uv: Py<Array>, chart: Py<Array>, stack: Py<Array>, report: Py<PyDict>, certificate: Py<PyDict>) -> Self {
+        Self { uv, chart, stack, report, certificate }
     }
 
     /// For `pickle` and `copy`.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py, Parts> {
         let (py, of) = (slf.py(), slf.get());
-        let parts =
-            (of.uv.clone_ref(py), of.chart.clone_ref(py), of.report.clone_ref(py), of.certificate.clone_ref(py));
-        (slf.get_type(), parts)
+        let [uv, chart, stack] = [&of.uv, &of.chart, &of.stack].map(|array| array.clone_ref(py));
+        (slf.get_type(), (uv, chart, stack, of.report.clone_ref(py), of.certificate.clone_ref(py)))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
@@ -127,9 +133,10 @@ impl MeshArrays {
 pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResult<Py<PyAny>> {
     let uv = Py::new(py, Array::from_f32_rows(atlas.uv))?;
     let chart = Py::new(py, Array::from_i32(atlas.chart))?;
+    let stack = Py::new(py, Array::from_i32(atlas.stack))?;
     let report = report::to_dict(py, &atlas.report)?.unbind();
     let certificate = report::certificate_to_dict(py, &atlas.certificate)?.unbind();
-    Ok(Py::new(py, Atlas { uv, chart, report, certificate })?.into_any())
+    Ok(Py::new(py, Atlas { uv, chart, stack, report, certificate })?.into_any())
 }
 
 /// Cut a surface into charts, flatten them under a stretch limit and pack them into one atlas.
@@ -161,10 +168,12 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 /// Returns
 /// -------
 /// Atlas
-///     ``uv`` (c, 2) float32, ``chart`` (f,) int32, ``certificate``, the outcome of the exact checks, and ``report``, a dict with ``charts``, ``faces``,
-///     ``unmapped_faces``, ``l2``, ``l2_chart_scale``, ``l2_worst_chart``, ``l_infinity``, ``angle_distortion``,
-///     ``area_distortion``, ``flips``, ``bent_quads``, ``overlaps``, ``seam_length``, ``packing_efficiency``, ``tiles``, ``texels_per_unit``,
-///     ``gap_texels``, ``chart_limit``, ``atlas_limit``, ``charts_over_limit``, ``rungs``, ``seconds``, ``warnings`` and more.
+///     ``uv`` (c, 2) float32, ``chart`` (f,) int32, ``stack`` (k,) int32 for k charts, ``certificate``, the outcome of
+///     the exact checks, and ``report``, a dict with ``charts``, ``stacked`` (charts that share their place with
+///     others) and ``stacks`` (such places), ``faces``, ``unmapped_faces``, ``l2``, ``l2_chart_scale``,
+///     ``l2_worst_chart``, ``l_infinity``, ``angle_distortion``, ``area_distortion``, ``flips``, ``bent_quads``,
+///     ``overlaps``, ``seam_length``, ``packing_efficiency``, ``tiles``, ``texels_per_unit``, ``gap_texels``,
+///     ``chart_limit``, ``atlas_limit``, ``charts_over_limit``, ``rungs``, ``seconds``, ``warnings`` and more.
 ///
 /// Raises
 /// ------
@@ -182,12 +191,11 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 /// InternalError
 ///     If the library is at fault.
 ///
-/// Notes
-/// -----
-/// Guaranteed, and checked on the float32 values returned: no triangle is flipped, no chart overlaps itself or another,
-/// charts keep the margin, each chart is under ``chart_limit`` or counted in ``charts_over_limit`` (a single face may not
-/// flatten under it); ``l2`` is under ``atlas_limit`` or a warning says so. The result is the same, bit for bit, for any number of threads. Not guaranteed: the fewest charts
-/// or the shortest seams.
+/// Notes ----- Guaranteed, and checked on the float32 values returned: no triangle is flipped, no chart overlaps itself
+/// or another, unless ``stack`` asks for it, charts keep the margin, each chart is under ``chart_limit`` or counted in
+/// ``charts_over_limit`` (a single face may not flatten under it); ``l2`` is under ``atlas_limit`` or a warning says
+/// so. The result is the same, bit for bit, for any number of threads. Not guaranteed: the fewest charts or the
+/// shortest seams.
 ///
 /// With several ``tiles``, charts are spread over them at one density, and each lies within one: tile k, from 0, is the square of UV with its lower left
 /// corner at (k mod 10, k // 10). A ``texel_density`` is that of all charts larger than a texel, times a factor of each where ``chart_scale`` is

@@ -11,15 +11,18 @@ use crate::charts::{Chart, Patch};
 use crate::flattening::{Rung, Rungs};
 use crate::mesh::{self, FaceId, Groups, Likeness, Plane, Shape, VertexId};
 use crate::progress::{Cancelled, Progress};
-use crate::settings::{LimitOver, Moves, Settings, Symmetry};
+use crate::settings::{LimitOver, Moves, Settings, Stack, Symmetry};
 
 use super::copied::copied;
 use super::state::Cutting;
 
-/// Charting components of fewer faces takes no longer than comparing them.
+/// Charting components of fewer faces takes no longer than comparing them. They are compared only where like ones are
+/// to be stacked, as leaves are.
 const LEAST_FACES: usize = 8;
 /// A component is compared with so many others at most that look the same by their numbers.
 const MOST_COMPARED: usize = 8;
+/// With so many where like ones are to be stacked: each that is missed takes a place of its own.
+const MOST_COMPARED_FOR_STACKS: usize = 64;
 /// So many of the largest components are looked at for a mirror plane of the object.
 const MOST_PLANES: usize = 5;
 
@@ -31,7 +34,7 @@ pub(super) struct Alike {
     /// The other: one that is charted itself, or a copy, of which this one is the mirror image.
     pub(super) original: usize,
     /// Of the original to this one.
-    likeness: Likeness,
+    pub(super) likeness: Likeness,
 }
 
 /// A component as a patch of itself, and where its vertices are beside those of others.
@@ -57,7 +60,8 @@ pub(super) fn alike(
         return Ok(likes);
     }
     let mut by_size: HashMap<usize, Vec<usize>> = HashMap::new();
-    for component in (0..components.len()).filter(|&c| components.group(c).len() >= LEAST_FACES) {
+    let least = if settings.stack == Stack::Off { LEAST_FACES } else { 1 };
+    for component in (0..components.len()).filter(|&c| components.group(c).len() >= least) {
         by_size.entry(components.group(component).len()).or_default().push(component);
     }
     let groups: Vec<Vec<usize>> = by_size.into_values().filter(|group| group.len() > 1).collect();
@@ -66,7 +70,7 @@ pub(super) fn alike(
     }
     let plane = if settings.symmetry == Symmetry::Auto { plane(components, placed, progress)? } else { None };
     let found: Vec<Result<Vec<(usize, Alike)>, Cancelled>> =
-        groups.par_iter().map(|group| alike_among(group, placed, plane.as_ref(), progress)).collect();
+        groups.par_iter().map(|group| alike_among(group, placed, plane.as_ref(), settings.stack, progress)).collect();
     for group in found {
         for (component, like) in group? {
             likes[component] = Some(like);
@@ -98,34 +102,40 @@ fn alike_among(
     group: &[usize],
     placed: &impl Fn(usize) -> Placed,
     plane: Option<&Plane>,
+    stack: Stack,
     progress: &Progress,
 ) -> Result<Vec<(usize, Alike)>, Cancelled> {
+    let most_compared = if stack == Stack::Off { MOST_COMPARED } else { MOST_COMPARED_FOR_STACKS };
     let mut originals: Vec<(usize, Placed)> = Vec::new();
     let mut middles: Vec<(usize, Point3<f64>)> = Vec::new();
     let mut likes = Vec::new();
     for &component in group {
         let own = placed(component);
-        let mut found = None;
+        // Only what is not mirrored lies on others of which equal ones alone are to.
+        let mut found = if stack == Stack::Equal { first_like(&originals, &own, &[false], progress)? } else { None };
         if let Some(plane) = plane {
             let middle = own.middle();
             let image = plane.mirrored(middle);
             let most = MISPLACED * own.extent();
             let partner = middles.iter().find(|other| (other.1 - image).norm() <= most);
-            if let Some(&(original, _)) = partner {
+            if let Some(&(original, _)) = partner.filter(|_| found.is_none()) {
                 let likeness = likeness_in(plane, &placed(original), &own, progress)?;
                 found = likeness.map(|likeness| Alike { original, likeness });
             }
             middles.push((component, middle));
         }
-        for (original, other) in &originals {
-            if found.is_some() {
-                break;
-            }
-            found = likeness(other, &own, progress)?.map(|likeness| Alike { original: *original, likeness });
+        if found.is_none() {
+            // What looks the same either way comes to lie on others with the texture as it is there.
+            let orientations: &[bool] = match stack {
+                Stack::Off => &[true, false],
+                Stack::Equal => &[true],
+                Stack::Mirrored => &[false, true],
+            };
+            found = first_like(&originals, &own, orientations, progress)?;
         }
         match found {
             Some(like) => likes.push((component, like)),
-            None if originals.len() < MOST_COMPARED => originals.push((component, own)),
+            None if originals.len() < most_compared => originals.push((component, own)),
             None => (),
         }
     }
@@ -149,13 +159,20 @@ fn likeness_in(
     }
 }
 
-/// The likeness of one component to another, wherever both are.
-fn likeness(here: &Placed, there: &Placed, progress: &Progress) -> Result<Option<Likeness>, Cancelled> {
-    let (Some(a), Some(b)) = (here.shape(), there.shape()) else { return Ok(None) };
-    for is_mirrored in [true, false] {
-        let found = a.likeness(&b, is_mirrored, |_, _| true, progress)?;
-        if found.is_some() {
-            return Ok(found);
+/// The first of some components that another one is like, wherever both are, with the first of the given orientations
+/// (whether it is mirrored) that there is.
+fn first_like(
+    originals: &[(usize, Placed)],
+    own: &Placed,
+    orientations: &[bool],
+    progress: &Progress,
+) -> Result<Option<Alike>, Cancelled> {
+    for (original, other) in originals {
+        let (Some(a), Some(b)) = (other.shape(), own.shape()) else { continue };
+        for &is_mirrored in orientations {
+            if let Some(likeness) = a.likeness(&b, is_mirrored, |_, _| true, progress)? {
+                return Ok(Some(Alike { original: *original, likeness }));
+            }
         }
     }
     Ok(None)

@@ -20,6 +20,7 @@ mod level;
 mod measured;
 mod merged;
 mod moves;
+mod originals;
 mod rigid_motion;
 mod search;
 mod state;
@@ -36,12 +37,12 @@ use rayon::prelude::*;
 
 use crate::cache::{self, Fingerprint, Kind, Run};
 use crate::charts::{Chart, Patch};
-use crate::flattening::Rungs;
-use crate::mesh::{FaceId, Groups, Surface, TriMesh};
+use crate::flattening::{Rung, Rungs};
+use crate::mesh::{self, FaceId, Groups, Surface, TriMesh};
 use crate::packing::PackSettings;
 use crate::progress::Cancelled;
 use crate::segmentation;
-use crate::settings::{ChartScale, LimitOver, Moves, Settings, Style};
+use crate::settings::{ChartScale, LimitOver, Moves, Settings, Stack, Style};
 
 use alike::{Alike, Placed, alike};
 use atlas_limit::join_within_atlas;
@@ -50,14 +51,16 @@ use moves::across::cut_across;
 
 pub(crate) use cost::Price;
 pub(crate) use divide::divide;
+pub(crate) use originals::{Described, Originals};
 pub(crate) use touch_up::touch_up;
 
 /// The charts of a component, and how they came about.
 type Made = (Vec<Chart>, Rungs);
 
-/// Cuts a surface into charts under the stretch limit of `settings`, sorted by lowest face. `components` holds the faces of
-/// each connected piece, ascending, `positions` says where the vertices of different pieces are beside each other, in units of the mesh,
-/// and `visibility` how far each vertex can be seen, where that matters.
+/// Cuts a surface into charts under the stretch limit of `settings`, sorted by lowest face. `components` holds the
+/// faces of each connected piece, ascending, `positions` says where the vertices of different pieces are beside each
+/// other, in units of the mesh, and `visibility` how far each vertex can be seen, where that matters. Where charts are
+/// to be stacked, tells what is a copy of what, too.
 ///
 /// # Errors
 /// The caller cancelled, or there is not enough memory.
@@ -68,7 +71,7 @@ pub(crate) fn cut(
     visibility: Option<&[f32]>,
     settings: &Settings,
     run: &Run<'_>,
-) -> Result<Made, Cancelled> {
+) -> Result<(Vec<Chart>, Rungs, Originals), Cancelled> {
     let mesh = &match visibility {
         Some(visibility) => cost::weighed(&surface.mesh, components, visibility, settings),
         None => Arc::clone(&surface.mesh),
@@ -104,6 +107,14 @@ pub(crate) fn cut(
     for (component, found) in in_parallel(originals, &of_component)? {
         made[component] = Some(found);
     }
+    // Elsewhere nothing is copied.
+    let stacks =
+        settings.stack != Stack::Off && settings.moves == Moves::All && settings.limit_over == LimitOver::Chart;
+    let mut rungs = Rungs::default();
+    if stacks {
+        // Before they are copied, so that copies are cut as their originals are, and take no place of their own.
+        across_originals(mesh, polygon, components, &mut made, settings, &mut rungs, run)?;
+    }
     // A copy may be the original of its mirror image: round by round, and each round makes some.
     let mut open = copies;
     while !open.is_empty() {
@@ -124,7 +135,12 @@ pub(crate) fn cut(
         }
         open = later;
     }
-    let (mut charts, mut rungs) = (Vec::new(), Rungs::default());
+    let originals = if stacks {
+        originals_of(mesh.face_count(), components, &likes, &made, &patch_of, settings, run)?
+    } else {
+        Originals::default()
+    };
+    let mut charts = Vec::new();
     for component in made.into_iter().flatten() {
         rungs.add(&component.1);
         match Arc::try_unwrap(component) {
@@ -138,10 +154,71 @@ pub(crate) fn cut(
     if settings.limit_over == LimitOver::Atlas {
         charts = touch_up(charts, &Price::new(mesh, settings), settings, &mut rungs, run.progress)?;
     }
-    if settings.moves == Moves::All {
+    if stacks {
+        charts.sort_by_key(|chart| chart.patch.faces.iter().min().copied());
+    } else if settings.moves == Moves::All {
         charts = cut_across(mesh, polygon, charts, settings, &mut rungs, run)?;
     }
-    Ok((charts, rungs))
+    Ok((charts, rungs, originals))
+}
+
+/// What is a copy of what: of components, and where mirrored halves are to be stacked of the halves of those that were
+/// charted so.
+fn originals_of(
+    face_count: usize,
+    components: &Groups<FaceId>,
+    likes: &[Option<Alike>],
+    made: &[Option<Arc<Made>>],
+    patch_of: &(impl Fn(usize) -> Patch + Sync),
+    settings: &Settings,
+    run: &Run<'_>,
+) -> Result<Originals, Cancelled> {
+    let mut originals = Originals::of(face_count, components, likes);
+    if settings.stack != Stack::Mirrored {
+        return Ok(originals);
+    }
+    let is_by_halves = |c: &usize| likes[*c].is_none() && made[*c].as_ref().is_some_and(|m| m.1.has(Rung::Mirrored));
+    let by_halves: Vec<usize> = (0..components.len()).filter(is_by_halves).collect();
+    let mirror = |&component: &usize| {
+        let patch = patch_of(component);
+        Ok((component, mesh::mirror(&patch.mesh, &patch.polygon, run.progress)?))
+    };
+    let found: Vec<Result<_, Cancelled>> = by_halves.par_iter().map(mirror).collect();
+    for found in found {
+        if let (component, Some(mirror)) = found? {
+            originals.add_halves(&mirror, components.group(component));
+        }
+    }
+    Ok(originals)
+}
+
+/// Cuts those charts across that are too long for the texture, of the components that have any yet.
+fn across_originals(
+    mesh: &TriMesh,
+    polygon: &[u32],
+    components: &Groups<FaceId>,
+    made: &mut [Option<Arc<Made>>],
+    settings: &Settings,
+    rungs: &mut Rungs,
+    run: &Run<'_>,
+) -> Result<(), Cancelled> {
+    let mut component_of = vec![usize::MAX; mesh.face_count()];
+    for (component, faces) in (0..components.len()).map(|c| (c, components.group(c))) {
+        faces.iter().for_each(|f| component_of[f.index()] = component);
+    }
+    let charts: Vec<Chart> = made.iter().flatten().flat_map(|made| made.0.iter().cloned()).collect();
+    let charts = cut_across(mesh, polygon, charts, settings, rungs, run)?;
+    let mut cut: Vec<Vec<Chart>> = vec![Vec::new(); made.len()];
+    for chart in charts {
+        let Some(first) = chart.patch.faces.first() else { continue };
+        cut[component_of[first.index()]].push(chart);
+    }
+    for (made, charts) in made.iter_mut().zip(cut) {
+        if let Some(made) = made {
+            *made = Arc::new((charts, made.1.clone()));
+        }
+    }
+    Ok(())
 }
 
 /// A component as a mesh of its own, which a connected surface is already.
@@ -182,6 +259,7 @@ fn charts_of(
         f.indices(faces.iter().map(|face| face.index()));
         f.settings(&Settings {
             chart_scale: ChartScale::Uniform,
+            stack: Stack::Off,
             packing: PackSettings::default(),
             ..settings.clone()
         });

@@ -119,6 +119,11 @@ impl Rungs {
         self.0[rung as usize] += 1;
     }
 
+    /// Whether it was taken at all.
+    pub(crate) fn has(&self, rung: Rung) -> bool {
+        self.0[rung as usize] > 0
+    }
+
     /// Adds the counts of another.
     pub(crate) fn add(&mut self, other: &Self) {
         for (a, b) in self.0.iter_mut().zip(other.0) {

@@ -4,6 +4,7 @@ mod mend;
 mod placed;
 mod quads;
 mod scale;
+mod stacks;
 mod summary;
 
 use std::collections::BTreeSet;
@@ -12,7 +13,7 @@ use crate::atlas::Atlas;
 use crate::cache::Run;
 use crate::charts::Chart;
 use crate::clock::Clock;
-use crate::cutting::{self, Price};
+use crate::cutting::{self, Originals, Price};
 use crate::error::UnwrapError;
 use crate::flattening::Rungs;
 use crate::mesh::{MeshInput, Surface};
@@ -23,6 +24,7 @@ use crate::verify::{self, Certificate};
 
 use mend::Faults;
 use placed::Placed;
+use stacks::Stacks;
 
 /// Rounds of packing, checking and mending. Needles that rounding breaks are gone after one; the rest
 /// is for charts whose parts break again.
@@ -30,11 +32,12 @@ const MOST_ROUNDS: usize = 12;
 /// Charts that came out too near are packed at least so many texels further apart.
 const LEAST_WIDENING: f64 = 1.0 / 16.0;
 
-/// Packs the charts and proves the result.
+/// Packs the charts and proves the result. `originals` tells which may lie on each other.
 pub(crate) fn lay_out(
     input: &MeshInput<'_>,
     surface: &Surface,
     mut charts: Vec<Chart>,
+    originals: &Originals,
     mut rungs: Rungs,
     settings: &Settings,
     mut clock: Clock,
@@ -44,15 +47,21 @@ pub(crate) fn lay_out(
     let texture = Texture::of(&settings.packing);
     let mut packing = settings.packing.clone();
     let mut round = 0;
+    let mut alone = BTreeSet::new();
     loop {
         run.progress.enter(Stage::Pack);
         scale::scale(&mut charts, settings);
-        let layout = Placed::new(input, surface, &charts, &packing, run.progress)?;
+        let stacks = Stacks::of(&charts, originals, &alone, settings, run.progress)?;
+        let layout = Placed::new(input, surface, &charts, &stacks, &packing, run.progress)?;
         clock.lap("pack");
-        run.progress.enter(Stage::Verify);
-        let mesh = arrays.uv_mesh(&layout.uv, &layout.face_chart, texture)?;
-        let certificate = verify::verify(&mesh, run.progress)?;
         round += 1;
+        if !layout.unstackable.is_empty() && round < MOST_ROUNDS {
+            alone.extend(layout.unstackable.iter().filter_map(|&number| stacks::lowest_face(&charts[number])));
+            continue;
+        }
+        run.progress.enter(Stage::Verify);
+        let mesh = arrays.uv_mesh(&layout.uv, &layout.face_chart, texture)?.with_stacks(&layout.stack);
+        let certificate = verify::verify(&mesh, run.progress)?;
         match next_step(&certificate, !layout.broken.is_empty(), round) {
             NextStep::End => {
                 drop(charts);
@@ -61,14 +70,18 @@ pub(crate) fn lay_out(
                 let mut report = summary::report_of(input, surface, &layout, &measures, settings);
                 report.rungs = rungs.taken();
                 report.seconds = clock.into_laps();
-                let atlas = Atlas::proven(layout.uv, layout.polygon_chart, report, certificate)?;
+                let atlas = Atlas::proven(layout.uv, layout.polygon_chart, layout.stack, report, certificate)?;
                 run.progress.enter(Stage::Done);
                 return Ok(atlas);
             }
             NextStep::Widen(shortfall) => packing.margin_texels += shortfall,
             NextStep::Mend => {
-                let faulty: BTreeSet<usize> =
+                let mut faulty: BTreeSet<usize> =
                     certificate.faulty_charts.iter().filter_map(|&c| usize::try_from(c).ok()).collect();
+                // The charts of a stack have the faults of the one that was looked at.
+                let faulty_stacks: BTreeSet<i32> =
+                    faulty.iter().map(|&c| layout.stack[c]).filter(|&s| s >= 0).collect();
+                faulty.extend((0..charts.len()).filter(|&c| faulty_stacks.contains(&layout.stack[c])));
                 let faults = Faults { round, faulty: &faulty, broken: &layout.broken };
                 // Sides that could be straightened are so already, and what is made anew is not looked at for them.
                 let unstraightened = Settings { straighten: 0.0, ..settings.clone() };

@@ -1,5 +1,7 @@
 //! Charts packed into the texture and rounded to single precision.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Point2;
 
 use crate::charts::Chart;
@@ -10,12 +12,17 @@ use crate::progress::Progress;
 use crate::rounding::{self, Rounding, RoundingError};
 
 use super::quads;
+use super::stacks::Stacks;
 
 /// Charts packed and rounded.
 pub(super) struct Placed {
     pub(super) uv: Vec<[f32; 2]>,
     pub(super) face_chart: Vec<i32>,
     pub(super) polygon_chart: Vec<i32>,
+    /// The stack of each chart, −1 for those that lie alone.
+    pub(super) stack: Vec<i32>,
+    /// Charts of which the UVs of the chart that they lie on turn faces over, once rounded.
+    pub(super) unstackable: Vec<usize>,
     /// Faces (of the surface) that rounding turned over, with their chart.
     pub(super) broken: Vec<(usize, FaceId)>,
     pub(super) specks: usize,
@@ -28,23 +35,31 @@ impl Placed {
         input: &MeshInput<'_>,
         surface: &Surface,
         charts: &[Chart],
+        stacks: &Stacks,
         packing: &PackSettings,
         progress: &Progress,
     ) -> Result<Self, UnwrapError> {
-        let packed = pack(charts, surface.scale, packing, progress)?;
+        let own_place: Vec<usize> = (0..charts.len()).filter(|&number| stacks.lying[number].is_none()).collect();
+        let alone: Vec<&Chart> = own_place.iter().map(|&number| &charts[number]).collect();
+        let packed = pack(&alone, surface.scale, packing, progress)?;
         let size = packed.size.map(f64::from);
         let mut layout = Self {
             uv: vec![[0.0; 2]; input.corner_vertices.len()],
             face_chart: vec![-1; surface.mesh.face_count()],
             polygon_chart: vec![-1; input.face_offsets.len().saturating_sub(1)],
+            stack: stacks.numbers(),
+            unstackable: Vec::new(),
             broken: Vec::new(),
             specks: packed.specks,
             texels_per_unit: packed.texels_per_unit,
             shortfall: packed.shortfall,
         };
-        for (number, (chart, tile)) in charts.iter().zip(&packed.tiles).enumerate() {
+        // What others lie on.
+        let mut rounded: Vec<Option<Vec<[f32; 2]>>> = vec![None; charts.len()];
+        for (item, (&number, tile)) in own_place.iter().zip(&packed.tiles).enumerate() {
             progress.check()?;
-            let exact: Vec<Point2<f64>> = chart.uv.iter().map(|p| packed.uv(number, *p)).collect();
+            let chart = &charts[number];
+            let exact: Vec<Point2<f64>> = chart.uv.iter().map(|p| packed.uv(item, *p)).collect();
             let texel = size.map(|s| 1.0 / s);
             let rounding = Rounding { texel, corner: tile.corner(), diagonal: surface.diagonal };
             let halves = quads::convex_halves(chart);
@@ -57,13 +72,23 @@ impl Placed {
                     unmendable.uv
                 }
             };
-            let label = i32::try_from(number).unwrap_or(i32::MAX);
-            for (local, &face) in chart.patch.mesh.faces().zip(&chart.patch.faces) {
-                layout.face_chart[face.index()] = label;
-                layout.polygon_chart[surface.input_polygon(face)] = label;
-                for (vertex, h) in chart.patch.mesh.triangle(local).iter().zip(face.halfedges()) {
-                    layout.uv[surface.corner[h.index()] as usize] = uv[vertex.index()];
-                }
+            layout.write(surface, number, chart, &uv);
+            if layout.stack[number] >= 0 {
+                rounded[number] = Some(uv);
+            }
+        }
+        let broken: BTreeSet<usize> = layout.broken.iter().map(|broken| broken.0).collect();
+        for (number, (chart, lying)) in charts.iter().zip(&stacks.lying).enumerate() {
+            let Some(lying) = lying else { continue };
+            progress.check()?;
+            let below = rounded[lying.on].as_deref().unwrap_or_default();
+            let uv: Vec<[f32; 2]> = lying.vertex.iter().map(|v| below[v.index()]).collect();
+            layout.write(surface, number, chart, &uv);
+            let turned = rounding::turned_faces(&chart.patch.mesh, &uv, lying.is_mirrored);
+            if broken.contains(&lying.on) {
+                layout.broken.extend(turned.into_iter().map(|f| (number, chart.patch.faces[f.index()])));
+            } else if !turned.is_empty() {
+                layout.unstackable.push(number);
             }
         }
         for &[corner, with] in &surface.followers {
@@ -74,10 +99,22 @@ impl Placed {
         }
         Ok(layout)
     }
+
+    /// Writes the UVs of a chart, one for each of its vertices.
+    fn write(&mut self, surface: &Surface, number: usize, chart: &Chart, uv: &[[f32; 2]]) {
+        let label = i32::try_from(number).unwrap_or(i32::MAX);
+        for (local, &face) in chart.patch.mesh.faces().zip(&chart.patch.faces) {
+            self.face_chart[face.index()] = label;
+            self.polygon_chart[surface.input_polygon(face)] = label;
+            for (vertex, h) in chart.patch.mesh.triangle(local).iter().zip(face.halfedges()) {
+                self.uv[surface.corner[h.index()] as usize] = uv[vertex.index()];
+            }
+        }
+    }
 }
 
 /// Packs charts whose unit is `unit` units of the input, in which densities are given and told.
-fn pack(charts: &[Chart], unit: f64, packing: &PackSettings, progress: &Progress) -> Result<Packed, UnwrapError> {
+fn pack(charts: &[&Chart], unit: f64, packing: &PackSettings, progress: &Progress) -> Result<Packed, UnwrapError> {
     let index = |v: VertexId| u32::try_from(v.index()).unwrap_or(u32::MAX);
     let triangles: Vec<Vec<[u32; 3]>> =
         charts.iter().map(|c| c.patch.mesh.triangles().iter().map(|t| t.map(index)).collect()).collect();

@@ -19,6 +19,8 @@ pub(super) fn report_of(
 ) -> Report {
     let mut report = Report::new(measures, settings.chart_limit());
     report.faces = input.face_offsets.len().saturating_sub(1);
+    report.stacked = layout.stack.iter().filter(|&&stack| stack >= 0).count();
+    report.stacks = layout.stack.iter().max().map_or(0, |&last| usize::try_from(last + 1).unwrap_or(0));
     report.unmapped_faces = surface.unmapped.len();
     report.texels_per_unit = layout.texels_per_unit;
     report.warnings = warnings(surface, layout);

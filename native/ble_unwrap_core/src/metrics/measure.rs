@@ -3,6 +3,8 @@
 //! Sander, Snyder, Gortler, Hoppe: Texture mapping progressive meshes, SIGGRAPH 2001, section 3, for
 //! the stretch; definitions otherwise as in the project's independent evaluator.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Point3;
 use rayon::prelude::*;
 
@@ -11,7 +13,7 @@ use crate::packing::Tile;
 use crate::progress::{Cancelled, Progress};
 
 use super::gap::{GAP_SEARCH_TEXELS, OwnedSegment, least_gap};
-use super::overlap::overlaps;
+use super::overlap::{Belonging, overlaps};
 use super::uv_mesh::UvMesh;
 use super::uv_topology::{NONE, UvTopology};
 
@@ -90,7 +92,9 @@ pub struct Measures {
     /// Number of triangles whose orientation in UV differs from that of most of their chart (by area on the surface), once
     /// the triangles of the chart have been oriented consistently on the surface.
     pub flips: usize,
-    /// Number of pairs of triangles that share more than 1e-9 of the area of the layout's bounding box.
+    /// Number of pairs of triangles that share more than 1e-9 of the area of the layout's bounding box. Pairs of
+    /// different charts of one stack are not counted, and of triangles of one stack that are the same one stands for
+    /// all.
     pub overlaps: u64,
     /// Number of those pairs whose triangles are in different islands.
     pub overlaps_between: u64,
@@ -102,12 +106,13 @@ pub struct Measures {
     pub seam_length_absolute: f64,
     /// Number of tiles in which triangles lie; 0 if one lies in none of those that there are.
     pub tiles: usize,
-    /// Share of the tiles in which triangles lie, or of the unit square if there is only one tile, that is covered; for a layout outside of all tiles,
-    /// share of its bounding square. Area that a pair of triangles covers twice is subtracted once for each pair, so the value means nothing if
+    /// Share of the tiles in which triangles lie, or of the unit square if there is only one tile, that is covered; for
+    /// a layout outside of all tiles, share of its bounding square. A stack covers what its largest chart does. Area
+    /// that a pair of triangles covers twice is subtracted once for each pair, so the value means nothing if
     /// `overlaps_complete` is false.
     pub packing_efficiency: f64,
-    /// Least distance between two islands in texels; 0 if boundaries cross. A distance above eight texels and above twice
-    /// the margin is given as the larger of these two values.
+    /// Least distance in texels between two islands that are not of one stack; 0 if boundaries cross. A distance above
+    /// eight texels and above twice the margin is given as the larger of these two values.
     pub gap_texels: f64,
     /// False if there was too much to search. The gap is then an upper bound.
     pub gap_complete: bool,
@@ -139,7 +144,7 @@ pub(crate) fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Ca
 
     let aspect = mesh.texture().aspect();
     let mut uv_box = [[f64::NAN; 2]; 2];
-    let uv: Vec<[[f64; 2]; 3]> = (0..m)
+    let mut uv: Vec<[[f64; 2]; 3]> = (0..m)
         .into_par_iter()
         .map(|f| match mesh.corner_uv(f) {
             Some(uv) if topology.chart[f] != NONE => uv.map(|p| [0, 1].map(|k| f64::from(p[k]) * aspect[k])),
@@ -191,27 +196,34 @@ pub(crate) fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Ca
     stretch(&mut out, mesh, &faces, &topology);
 
     let texels = mesh.texture().texels();
+    let stack = |f: usize| mesh.stack(mesh.label(f)).map(i32::unsigned_abs);
+    // A stack is one owner, beyond all islands: no more than 2³⁰ of these, and 2³¹ stacks.
+    let owner = |f: usize| stack(f).map_or(topology.island[f], |stack| topology.island_count as u32 + stack);
     let segment = |&h: &u32| {
         let (f, k) = (h as usize / 3, h as usize % 3);
         let ends = [uv[f][k], uv[f][(k + 1) % 3]].map(|p| [0, 1].map(|k| p[k] / aspect[k] * texels[k]));
-        OwnedSegment { ends, owner: topology.island[f] }
+        OwnedSegment { ends, owner: owner(f) }
     };
     let segments: Vec<OwnedSegment> = topology.boundary.iter().map(segment).collect();
     let limit = GAP_SEARCH_TEXELS.max(2.0 * mesh.texture().margin);
     (out.gap_texels, out.gap_complete) = least_gap(&segments, limit, progress)?;
 
-    let mapped = (0..m).filter(|&f| topology.chart[f] != NONE);
-    let uv_area = mapped.map(|f| faces[f].uv_double_area.abs()).sum::<f64>() * 0.5;
+    let uv_area = covered_once(mesh, &faces, &topology);
+    let tiles = tiles_used(&uv, aspect, mesh.texture().tiles);
     // The search for overlaps takes most memory: nothing else should be held then.
     drop((positions, faces, segments));
     let layout_box = extent[0].max(1e-30) * extent[1].max(1e-30);
-    let common = overlaps(&uv, &topology.island, OVERLAP_SHARE * layout_box, progress)?;
+    for f in repeated(mesh, &uv, &topology) {
+        uv[f] = [[f64::NAN; 2]; 3];
+    }
+    let of: Vec<Belonging> =
+        (0..m).map(|f| Belonging { group: topology.island[f], stack: stack(f).unwrap_or(NONE) }).collect();
+    let common = overlaps(&uv, &of, OVERLAP_SHARE * layout_box, progress)?;
     out.overlaps = common.pairs;
     out.overlaps_between = common.between;
     out.overlaps_complete = common.complete;
 
     let covered = (uv_area - common.area).max(0.0);
-    let tiles = tiles_used(&uv, aspect, mesh.texture().tiles);
     out.tiles = tiles.unwrap_or(0);
     let whole = match tiles {
         Some(used) => aspect[0] * aspect[1] * used.max(1) as f64,
@@ -219,6 +231,40 @@ pub(crate) fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Ca
     };
     out.packing_efficiency = if common.complete { covered / whole } else { (covered / whole).min(1.0) };
     Ok(out)
+}
+
+/// The area of all triangles in UV, in which a stack counts once, as its largest chart.
+fn covered_once(mesh: &UvMesh, faces: &[FaceMeasures], topology: &UvTopology) -> f64 {
+    let (mut alone, mut stacked) = (0.0, BTreeMap::<(i32, i32), f64>::new());
+    for f in (0..faces.len()).filter(|&f| topology.chart[f] != NONE) {
+        let label = mesh.label(f);
+        let sum = match mesh.stack(label) {
+            Some(stack) => stacked.entry((stack, label)).or_default(),
+            None => &mut alone,
+        };
+        *sum += faces[f].uv_double_area.abs();
+    }
+    let mut largest = BTreeMap::<i32, f64>::new();
+    for ((stack, _), area) in stacked {
+        let most = largest.entry(stack).or_default();
+        *most = most.max(area);
+    }
+    (alone + largest.values().sum::<f64>()) * 0.5
+}
+
+/// Triangles that are the same in UV as one of another island of their stack with a lower number: hundreds of copies of
+/// a triangle would be tens of thousands of pairs.
+fn repeated(mesh: &UvMesh, uv: &[[[f64; 2]; 3]], topology: &UvTopology) -> Vec<usize> {
+    let stacked = |f: usize| {
+        let stack = mesh.stack(mesh.label(f)).filter(|_| topology.chart[f] != NONE)?;
+        let mut corners = uv[f].map(|p| p.map(f64::to_bits));
+        corners.sort_unstable();
+        Some((stack, corners, topology.island[f], f))
+    };
+    let mut all: Vec<_> = (0..uv.len()).filter_map(stacked).collect();
+    all.sort_unstable();
+    let same = all.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
+    same.flat_map(|same| same.iter().filter(|other| other.2 != same[0].2).map(|other| other.3)).collect()
 }
 
 /// Number of tiles in which triangles lie, `None` if one lies in none of the first `count`. A triangle is in the tile that its centre is in, and

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use crate::progress::{Cancelled, Progress};
 
 use super::box_tree::{Bounds, BoxTree, Visitor, in_batches};
+use super::uv_topology::NONE;
 
 /// Counting stops after this many overlapping pairs: such a layout is broken or stacked on purpose,
 /// and the exact number says no more.
@@ -27,6 +28,21 @@ pub(crate) struct Overlaps {
     pub(crate) complete: bool,
 }
 
+/// What triangles belong to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Belonging {
+    /// What a pair between different ones is counted for in [`Overlaps::between`].
+    pub(crate) group: u32,
+    /// Triangles of different groups that share a stack may overlap, and are not counted; [`NONE`] shares with none.
+    pub(crate) stack: u32,
+}
+
+impl Belonging {
+    fn may_overlap(&self, other: &Self) -> bool {
+        self.stack == other.stack && self.stack != NONE && self.group != other.group
+    }
+}
+
 /// Counts pairs of triangles (either orientation) with more than `threshold` of common area; NaN has none.
 ///
 /// Not exact: areas come from double-precision clipping. O(n log n + pairs), and a bounded number of
@@ -36,7 +52,7 @@ pub(crate) struct Overlaps {
 /// [`Cancelled`].
 pub(crate) fn overlaps(
     triangles: &[[[f64; 2]; 3]],
-    group: &[u32],
+    of: &[Belonging],
     threshold: f64,
     progress: &Progress,
 ) -> Result<Overlaps, Cancelled> {
@@ -51,9 +67,9 @@ pub(crate) fn overlaps(
     let counter_clockwise = |position: usize| {
         let f = large[tree.source(position)];
         let [a, b, c] = triangles[f as usize];
-        (if twice(f) < 0.0 { [c, b, a] } else { [a, b, c] }, group[f as usize])
+        (if twice(f) < 0.0 { [c, b, a] } else { [a, b, c] }, of[f as usize])
     };
-    let ordered: Vec<([[f64; 2]; 3], u32)> = (0..tree.len()).map(counter_clockwise).collect();
+    let ordered: Vec<([[f64; 2]; 3], Belonging)> = (0..tree.len()).map(counter_clockwise).collect();
     let mut state = (Overlaps { complete: true, ..Overlaps::default() }, 0u64);
     let total_budget = 100 * ordered.len() as u64 + 50_000_000;
     in_batches(
@@ -87,7 +103,7 @@ pub(crate) fn overlaps(
 
 struct Counter<'a> {
     tree: &'a BoxTree,
-    ordered: &'a [([[f64; 2]; 3], u32)],
+    ordered: &'a [([[f64; 2]; 3], Belonging)],
     threshold: f64,
     me: usize,
     seen: u64,
@@ -109,11 +125,14 @@ impl Visitor for Counter<'_> {
         self.seen += 1;
         if self.tree.bounds(self.me).overlaps(self.tree.bounds(position)) {
             let ((a, ga), (b, gb)) = (&self.ordered[self.me], &self.ordered[position]);
+            if ga.may_overlap(gb) {
+                return self.may_go_on();
+            }
             let area = common_area(a, b);
             if area > self.threshold {
                 self.found.pairs += 1;
                 self.found.area += area;
-                self.found.between += u64::from(ga != gb);
+                self.found.between += u64::from(ga.group != gb.group);
             }
         }
         self.may_go_on()
@@ -168,6 +187,8 @@ fn common_area(a: &[[f64; 2]; 3], b: &[[f64; 2]; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const ALONE: Belonging = Belonging { group: 0, stack: NONE };
 
     fn random_triangles(n: usize, size: f64, seed: u64) -> Vec<[[f64; 2]; 3]> {
         let mut state = seed;
@@ -227,7 +248,8 @@ mod tests {
         for (n, size) in [(30, 0.5), (400, 0.08), (900, 0.02)] {
             let t = random_triangles(n, size, n as u64);
             let group: Vec<u32> = (0..n as u32).map(|i| i % 3).collect();
-            let got = overlaps(&t, &group, 1e-9, &Progress::new()).expect("not cancelled");
+            let of: Vec<Belonging> = group.iter().map(|&group| Belonging { group, stack: NONE }).collect();
+            let got = overlaps(&t, &of, 1e-9, &Progress::new()).expect("not cancelled");
             let (mut pairs, mut between, mut area) = (0, 0, 0.0);
             for i in 0..n {
                 for j in 0..i {
@@ -262,14 +284,28 @@ mod tests {
                 ]
             })
             .collect();
-        let got = overlaps(&t, &vec![0; t.len()], 1e-9, &Progress::new()).expect("not cancelled");
+        let got = overlaps(&t, &vec![ALONE; t.len()], 1e-9, &Progress::new()).expect("not cancelled");
         assert_eq!((got.pairs, got.complete), (0, true));
     }
 
     #[test]
     fn a_pile_of_equal_triangles_ends_and_says_so() {
         let t = vec![[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]; 60_000];
-        let got = overlaps(&t, &vec![0; t.len()], 1e-9, &Progress::new()).expect("not cancelled");
+        let got = overlaps(&t, &vec![ALONE; t.len()], 1e-9, &Progress::new()).expect("not cancelled");
         assert!(!got.complete && got.pairs >= PAIR_LIMIT, "{got:?}");
+    }
+
+    #[test]
+    fn what_shares_a_stack_may_overlap_but_nothing_else_and_no_group_itself() {
+        let t = vec![[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]; 4];
+        let count = |of: [[u32; 2]; 4]| {
+            let of = of.map(|[group, stack]| Belonging { group, stack });
+            overlaps(&t, &of, 1e-9, &Progress::new()).expect("not cancelled").pairs
+        };
+        assert_eq!(count([[0, 7], [1, 7], [2, 7], [3, 7]]), 0);
+        assert_eq!(count([[0, 7], [1, 7], [2, 7], [3, NONE]]), 3);
+        assert_eq!(count([[0, 7], [1, 7], [2, 8], [3, 8]]), 4);
+        assert_eq!(count([[0, 7], [0, 7], [1, 7], [2, 7]]), 1, "a chart that overlaps itself");
+        assert_eq!(count([[0, NONE], [1, NONE], [2, NONE], [3, NONE]]), 6);
     }
 }

@@ -63,6 +63,8 @@ pub(crate) struct UvMesh<'a> {
     uv: &'a [[f32; 2]],
     corner_triangles: &'a [[u32; 3]],
     chart: &'a [i32],
+    /// The stack of each label, if any are stacked.
+    stack: &'a [i32],
     texture: Texture,
 }
 
@@ -96,7 +98,21 @@ impl<'a> UvMesh<'a> {
             let mapped = chart.is_empty() || chart[triangle] >= 0;
             assert!(!mapped || corners.iter().all(|&c| (c as usize) < uv.len()), "triangle {triangle} names no corner");
         }
-        Ok(Self { positions, triangles, uv, corner_triangles, chart, texture })
+        Ok(Self { positions, triangles, uv, corner_triangles, chart, stack: &[], texture })
+    }
+
+    /// The same, with charts that lie on each other on purpose: `stack` holds, for each label from 0 on, a number that
+    /// the labels of one stack share; charts with a negative number, and with a label beyond the list, lie alone.
+    #[must_use]
+    pub(crate) fn with_stacks(self, stack: &'a [i32]) -> Self {
+        Self { stack, ..self }
+    }
+
+    /// The stack of the charts with this label, if they lie on others.
+    #[must_use]
+    pub(crate) fn stack(&self, label: i32) -> Option<i32> {
+        let stack = *self.stack.get(usize::try_from(label).ok()?)?;
+        (stack >= 0).then_some(stack)
     }
 
     /// Vertex positions.

@@ -11,9 +11,9 @@ pub(crate) const NONE: u32 = u32::MAX;
 
 /// What belongs together in a layout.
 ///
-/// Corners at the same mesh vertex with the same float32 UV are one UV vertex. Two triangles are in
-/// one *chart* if they share a mesh edge with the same UV vertices at both ends; charts that share a
-/// UV vertex are one *island*.
+/// Corners at the same mesh vertex with the same float32 UV are one UV vertex, unless they are of different charts that
+/// lie in a stack. Two triangles are in one *chart* if they share a mesh edge with the same UV vertices at both ends;
+/// charts that share a UV vertex are one *island*.
 pub(crate) struct UvTopology {
     /// Chart of each triangle, numbered by lowest triangle; [`NONE`] where it has no finite UV.
     pub(crate) chart: Vec<u32>,
@@ -146,14 +146,17 @@ fn weld(mesh: &UvMesh) -> (Vec<[u32; 3]>, usize, usize) {
     for v in 1..start.len() {
         start[v] += start[v - 1];
     }
-    let mut entries = vec![(0u64, 0u32); start.last().copied().unwrap_or(0) as usize];
+    let mut entries = vec![(0u64, 0u32, 0u32); start.last().copied().unwrap_or(0) as usize];
     let mut next = start.clone();
     for f in (0..m).filter(|&f| mapped[f]) {
         let Some(uv) = mesh.corner_uv(f) else { continue };
+        // A chart and its mirror image that lie on each other meet in UV, too, where they meet on the surface.
+        let label = mesh.label(f);
+        let stacked = if mesh.stack(label).is_some() { label.unsigned_abs() + 1 } else { 0 };
         for k in 0..3 {
             let slot = &mut next[mesh.triangles()[f][k] as usize];
             let bits = u64::from(uv[k][0].to_bits()) << 32 | u64::from(uv[k][1].to_bits());
-            entries[*slot as usize] = (bits, (3 * f + k) as u32);
+            entries[*slot as usize] = (bits, stacked, (3 * f + k) as u32);
             *slot += 1;
         }
     }
@@ -161,8 +164,8 @@ fn weld(mesh: &UvMesh) -> (Vec<[u32; 3]>, usize, usize) {
     for bucket in start.windows(2) {
         let bucket = &mut entries[bucket[0] as usize..bucket[1] as usize];
         bucket.sort_unstable();
-        for same in bucket.chunk_by(|a, b| a.0 == b.0) {
-            for &(_, c) in same {
+        for same in bucket.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            for &(.., c) in same {
                 uv_vertex[c as usize / 3][c as usize % 3] = count;
             }
             count += 1;

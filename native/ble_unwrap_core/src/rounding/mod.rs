@@ -135,6 +135,20 @@ pub(crate) fn round_to_f32(
     }
 }
 
+/// The triangles of a chart that do not have a strictly positive area with these UVs, or, of a mirror image, a strictly
+/// negative one. Exact. O(n).
+///
+/// # Panics
+/// If `uv` does not hold one UV a vertex.
+pub(crate) fn turned_faces(mesh: &TriMesh, uv: &[[f32; 2]], is_mirrored: bool) -> Vec<FaceId> {
+    assert_eq!(uv.len(), mesh.vertex_count(), "one UV a vertex");
+    let is_turned = |f: &FaceId| {
+        let [a, b, c] = mesh.triangle(*f).map(|v| uv[v.index()]);
+        !is_positive(if is_mirrored { double_area(a, c, b) } else { double_area(a, b, c) })
+    };
+    mesh.faces().filter(is_turned).collect()
+}
+
 /// The halves that quads have by their other diagonal.
 struct Halves<'a> {
     triangles: &'a [[VertexId; 3]],

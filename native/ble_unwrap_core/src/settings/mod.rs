@@ -121,6 +121,26 @@ choices!(Symmetry {
     Off: "off", "Off", "Seams are found without regard to mirror planes.";
 });
 
+/// Which charts lie on each other in the texture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Stack {
+    /// None do: each has its own place.
+    Off,
+    /// The charts of equal parts lie on each other: of connected pieces that are the same but for where they are and
+    /// how they are turned.
+    Equal,
+    /// So do those of mirrored parts, and each chart of one half of a mirrored piece lies on its mirror image in the
+    /// other half, where these are two charts.
+    Mirrored,
+}
+
+choices!(Stack {
+    Off: "off", "Off", "Every chart has a place of its own.";
+    Equal: "equal", "Equal Parts", "Charts of equal parts lie exactly on each other and share their pixels.";
+    Mirrored: "mirrored", "Equal and Mirrored", "Charts of mirrored parts and mirrored halves do so, too; there, the texture is mirrored on the surface.";
+});
+
 /// What kind of thing a mesh is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -234,6 +254,11 @@ pub struct Settings {
     /// Whether charts of mirrored surfaces are mirrored, too. A mirror plane is one that takes every vertex of a connected piece to
     /// another, to a thousandth of its size, and every polygon to another. UVs are not mirrored: each half has its own place.
     pub symmetry: Symmetry,
+    /// Which charts lie on each other. Parts are alike if they have the same polygons, to a thousandth of their size,
+    /// and the same seams, guides and weights of seams. What is stacked shares its UVs to the bit, and the place that
+    /// it does not need gives all charts more texels. The UVs of a chart that lies on its mirror image are mirrored as
+    /// a whole; nothing else is ever mirrored. Has an effect only with all `moves` and with a limit over each chart.
+    pub stack: Stack,
     /// What kind of thing the mesh is. Planes, walls of cylinders and the like, which lie flat without stretch, are cut out at the hard edges around
     /// them and come out as they are; they are joined to others only if the result lies flat, too. Has an effect only with all `moves`; a limit
     /// over the atlas, and the mirror plane of a symmetric piece, may join them otherwise.
@@ -279,6 +304,7 @@ impl Default for Settings {
             hide_seams: 2.0,
             front: Front::None,
             symmetry: Symmetry::Auto,
+            stack: Stack::Off,
             style: Style::Auto,
             straighten: 0.25,
             holes: Holes::Keep,

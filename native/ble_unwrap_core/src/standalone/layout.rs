@@ -32,6 +32,19 @@ pub enum LayoutError {
         /// Number of faces.
         faces: usize,
     },
+    /// A chart has no number of a stack.
+    #[error(
+        "there are {found} numbers of stacks, but a face belongs to chart {chart}; give one a chart, from chart 0 on, or none"
+    )]
+    StackCount {
+        /// Number of stacks that were given.
+        found: usize,
+        /// The first chart without one.
+        chart: i32,
+    },
+    /// Stacks of charts are given, but not which face belongs to which chart.
+    #[error("stacks are given, but no chart numbers; give one a face")]
+    StacksOfNoCharts,
     /// The triangulated mesh is too large to be measured.
     #[error("{triangles} triangles are more than the 2^30 that can be measured; give the mesh in parts")]
     TooManyTriangles {
@@ -49,7 +62,9 @@ impl LayoutError {
     pub fn kind(&self) -> ErrorKind {
         match self {
             Self::Mesh(error) => error.kind(),
-            Self::UvCount { .. } | Self::ChartCount { .. } => ErrorKind::Argument,
+            Self::UvCount { .. } | Self::ChartCount { .. } | Self::StackCount { .. } | Self::StacksOfNoCharts => {
+                ErrorKind::Argument
+            }
             Self::TooManyTriangles { .. } => ErrorKind::Mesh,
             Self::Cancelled(error) => error.kind(),
         }
@@ -82,9 +97,13 @@ pub struct LayoutMeasures {
 /// face, which is negative for faces without UVs.
 ///
 /// Faces are triangulated as [`unwrap`](crate::unwrap()) does it: by `input.corner_triangles` where they cover a face.
-/// Charts are found from the UVs; `chart` only tells which faces have UVs. Of the settings, only those of welding and of
-/// the texture matter. If a mesh repeats its vertices along its seams, then without `settings.weld` the seams count as
-/// boundary of the mesh, and their length is not measured.
+/// Charts are found from the UVs; `chart` only tells which faces have UVs, and which belong together where `stack` is
+/// not empty. It then holds one number for each chart, as [`Atlas::stack`](crate::Atlas::stack) does: charts with the
+/// same number, which is at least 0, lie on each other on purpose. Their overlaps are not counted, they need keep no
+/// margin, each stack covers the place of its largest chart, and they are different charts also where a chart and its
+/// mirror image meet. Whether they lie exactly on each other is for [`certify`] to say. Of the settings, only those of
+/// welding and of the texture matter. If a mesh repeats its vertices along its seams, then without `settings.weld` the
+/// seams count as boundary of the mesh, and their length is not measured.
 ///
 /// UVs are measured in the proportions of the texture, so a layout for a 2:1 texture that shows no distortion on the
 /// surface has none here either. One unit of UV is the width and height of the texture in texels, even where the layout
@@ -101,12 +120,14 @@ pub fn measure_layout(
     input: &MeshInput<'_>,
     uv: &[[f32; 2]],
     chart: Option<&[i32]>,
+    stack: &[i32],
     settings: &Settings,
     progress: &Progress,
 ) -> Result<LayoutMeasures, LayoutError> {
-    let (surface, label) = conditioned(input, uv, chart, settings, progress)?;
+    let (surface, label) = conditioned(input, uv, chart, stack, settings, progress)?;
     let arrays = LayoutArrays::new(input, &surface);
-    let measures = metrics::measure(&arrays.uv_mesh(uv, &label, Texture::of(&settings.packing))?, progress)?;
+    let mesh = arrays.uv_mesh(uv, &label, Texture::of(&settings.packing))?.with_stacks(stack);
+    let measures = metrics::measure(&mesh, progress)?;
     let faces = input.face_offsets.len().saturating_sub(1);
     let mut mapped = vec![true; faces];
     for &p in &surface.unmapped {
@@ -124,11 +145,13 @@ pub fn measure_layout(
 /// Checks a UV map exactly, whoever made it, by the same checks that [`unwrap`](crate::unwrap()) makes before it returns an
 /// atlas. `uv` holds one UV for each corner, and `chart` one number for each face, which is negative for faces without UVs.
 ///
-/// The certificate is [valid](Certificate::is_valid) if no triangle is turned over, no chart overlaps itself or another,
-/// all UVs lie in the unit square, or each chart in one of the tiles of the texture, and charts are at least the margin apart. Faces with the same number in `chart` are one
-/// chart. Faces are triangulated and consistently oriented as [`unwrap`](crate::unwrap()) does it. The certificate numbers
-/// the triangles made in this way, which are in the order of the faces. Of the settings, only those of welding and of the
-/// texture matter.
+/// The certificate is [valid](Certificate::is_valid) if no triangle is turned over, no chart overlaps itself or
+/// another, all UVs lie in the unit square, or each chart in one of the tiles of the texture, and charts are at least
+/// the margin apart. `stack`, if it is not empty, holds a number for each chart, as for [`measure_layout`]: charts of
+/// one stack must lie exactly on each other instead, to the bit, and may be mirrored as wholes. Faces with the same
+/// number in `chart` are one chart. Faces are triangulated and consistently oriented as [`unwrap`](crate::unwrap())
+/// does it. The certificate numbers the triangles made in this way, which are in the order of the faces. Of the
+/// settings, only those of welding and of the texture matter.
 ///
 /// All signs come from exact predicates, so there is no tolerance. The result is the same for any number of threads. O(n
 /// log n); less than a second for a million triangles.
@@ -140,12 +163,13 @@ pub fn certify(
     input: &MeshInput<'_>,
     uv: &[[f32; 2]],
     chart: &[i32],
+    stack: &[i32],
     settings: &Settings,
     progress: &Progress,
 ) -> Result<Certificate, LayoutError> {
-    let (surface, label) = conditioned(input, uv, Some(chart), settings, progress)?;
+    let (surface, label) = conditioned(input, uv, Some(chart), stack, settings, progress)?;
     let arrays = LayoutArrays::new(input, &surface);
-    Ok(verify(&arrays.uv_mesh(uv, &label, Texture::of(&settings.packing))?, progress)?)
+    Ok(verify(&arrays.uv_mesh(uv, &label, Texture::of(&settings.packing))?.with_stacks(stack), progress)?)
 }
 
 /// The conditioned mesh, and the chart of each of its triangles if charts are given.
@@ -153,6 +177,7 @@ fn conditioned(
     input: &MeshInput<'_>,
     uv: &[[f32; 2]],
     chart: Option<&[i32]>,
+    stack: &[i32],
     settings: &Settings,
     progress: &Progress,
 ) -> Result<(Surface, Vec<i32>), LayoutError> {
@@ -165,6 +190,13 @@ fn conditioned(
     let faces = input.face_offsets.len().saturating_sub(1);
     if let Some(found) = chart.map(<[i32]>::len).filter(|&found| found != faces) {
         return Err(LayoutError::ChartCount { found, faces });
+    }
+    if !stack.is_empty() {
+        let charts = chart.ok_or(LayoutError::StacksOfNoCharts)?;
+        let has_none = |&chart: &i32| usize::try_from(chart).is_ok_and(|chart| chart >= stack.len());
+        if let Some(chart) = charts.iter().copied().filter(has_none).min() {
+            return Err(LayoutError::StackCount { found: stack.len(), chart });
+        }
     }
     // In the form that an unwrap works on, so that polygons without triangles are judged by the same ones.
     let surface = mesh::canonical(mesh::condition(input, &settings.conditioning(), progress)?, progress)?;
@@ -218,7 +250,7 @@ mod tests {
     }
 
     fn measured(uv: &[[f32; 2]], chart: Option<&[i32]>) -> Result<LayoutMeasures, LayoutError> {
-        measure_layout(&input(), uv, chart, &settings(), &Progress::new())
+        measure_layout(&input(), uv, chart, &[], &settings(), &Progress::new())
     }
 
     #[test]
@@ -251,7 +283,7 @@ mod tests {
     }
 
     fn certified(uv: &[[f32; 2]], chart: &[i32]) -> Result<Certificate, LayoutError> {
-        certify(&input(), uv, chart, &settings(), &Progress::new())
+        certify(&input(), uv, chart, &[], &settings(), &Progress::new())
     }
 
     #[test]
@@ -271,5 +303,51 @@ mod tests {
         turned[4..8].iter_mut().for_each(|uv| uv[0] = 1.4 - uv[0]);
         assert!(certified(&turned, &[0, 1, -1]).is_ok_and(|c| c.flipped.count == 2 && c.faulty_charts == [1]));
         assert_eq!(certified(&UV, &[0]), Err(LayoutError::ChartCount { found: 1, faces: 3 }));
+    }
+
+    #[test]
+    fn a_stack_is_measured_and_proven_as_one_place() {
+        let settings = settings();
+        // The second square upon the first, as it is and mirrored.
+        let mut upon = UV;
+        upon.copy_within(0..4, 4);
+        let mut mirrored = upon;
+        mirrored[4..8].swap(0, 1);
+        mirrored[4..8].swap(2, 3);
+        let chart = [0, 1, -1];
+        for uv in [&upon, &mirrored] {
+            let proven = certify(&input(), uv, &chart, &[0, 0], &settings, &Progress::new()).expect("valid");
+            assert!(proven.is_valid() && (proven.charts, proven.stacked) == (2, 2), "{proven}");
+            let m = measure_layout(&input(), uv, Some(&chart), &[5, 5], &settings, &Progress::new());
+            let m = m.expect("valid").measures;
+            assert_eq!((m.charts, m.overlaps, m.flips, m.gap_texels), (2, 0, 0, 8.0));
+            assert!((m.packing_efficiency - 0.04).abs() < 1e-6 && (m.seam_length_absolute - 2.0).abs() < 1e-9, "{m:?}");
+            for stack in [[].as_slice(), &[0, -1], &[0, 1]] {
+                let broken = certify(&input(), uv, &chart, stack, &settings, &Progress::new()).expect("valid");
+                assert!(!broken.is_injective() && broken.stacked == 0, "{broken}");
+                let m = measure_layout(&input(), uv, Some(&chart), stack, &settings, &Progress::new());
+                assert!(m.expect("valid").measures.overlaps > 0);
+            }
+        }
+        // By one step of single precision beside it.
+        let mut beside = upon;
+        beside[6][0] = beside[6][0].next_up();
+        let found = certify(&input(), &beside, &chart, &[0, 0], &settings, &Progress::new()).expect("valid");
+        assert!(found.apart.first == Some(1) && !found.is_valid() && found.faulty_charts == [1], "{found}");
+        // Mirrored in one triangle only.
+        let mut partly = upon;
+        partly[6] = [0.2, 0.05];
+        let found = certify(&input(), &partly, &chart, &[0, 0], &settings, &Progress::new()).expect("valid");
+        assert!(found.flipped.count == 1 && found.apart.count == 1, "{found}");
+    }
+
+    #[test]
+    fn stacks_need_a_number_for_each_chart() {
+        let of = |chart: Option<&[i32]>, stack: &[i32]| {
+            measure_layout(&input(), &UV, chart, stack, &settings(), &Progress::new()).map(|_| ())
+        };
+        assert_eq!(of(Some(&[0, 1, -1]), &[3]), Err(LayoutError::StackCount { found: 1, chart: 1 }));
+        assert_eq!(of(None, &[0, 0]), Err(LayoutError::StacksOfNoCharts));
+        assert_eq!(of(Some(&[0, -1, -1]), &[3]), Ok(()));
     }
 }

@@ -24,9 +24,10 @@ use prepared::Prepared;
 /// [tiles](crate::settings::PackSettings::tiles) of that size, each chart into one.
 ///
 /// Guaranteed for every result, checked exactly on the final single-precision values, and proven by its
-/// [`Certificate`](crate::Certificate): each face whose vertices are all finite lies in exactly one chart; no triangle is
-/// flipped or without area; no chart overlaps itself or another; charts keep the margin. Where this cannot be proven, the
-/// call fails.
+/// [`Certificate`](crate::Certificate): each face whose vertices are all finite lies in exactly one chart; no triangle
+/// is flipped or without area; no chart overlaps itself or another; charts keep the margin. With [`Settings::stack`]
+/// charts of like parts lie on each other instead, exactly, and the triangles of a mirrored one are all turned over
+/// there. Where this cannot be proven, the call fails.
 ///
 /// Every chart has an L2 stretch within `settings.stretch_limit`, or is listed in the report (a single polygon, which is
 /// never cut, may have more). Where [`Settings::limit_over`] is the atlas, a chart is held to [`Settings::chart_limit`]

@@ -50,9 +50,10 @@ impl Prepared {
             vertex.iter().map(|&v| input.positions[v as usize].map(|x| x / scale).into()).collect();
         let visibility = self.visibility(&positions, settings, run)?;
         let visibility = visibility.as_deref().map(Vec::as_slice);
-        let (charts, rungs) = cutting::cut(&self.surface, &self.components, &positions, visibility, settings, run)?;
+        let (charts, rungs, originals) =
+            cutting::cut(&self.surface, &self.components, &positions, visibility, settings, run)?;
         clock.lap("charts");
-        layout::lay_out(input, &self.surface, charts, rungs, settings, clock, run)
+        layout::lay_out(input, &self.surface, charts, &originals, rungs, settings, clock, run)
     }
 
     /// How far each vertex of the surface can be seen, where seams are to be hidden.

@@ -28,10 +28,22 @@
 //!
 //! Two charts that share area without their boundaries meeting would have a loop of one inside the
 //! filled area of the other. So 1 to 5 make the whole layout injective.
+//!
+//! # Stacks
+//!
+//! Charts may lie on each other on purpose. Of each stack one chart goes through all of the above: the one with the
+//! lowest label whose triangle with the lowest number is positive. Each other one must
+//!
+//! 6. have only strictly positive triangles, or only strictly negative ones, if it is mirrored: its boundary chain is
+//!    then taken the other way round;
+//! 7. have the same boundary chain as that one, edge by edge and to the bit.
+//!
+//! Then its winding numbers are those of that chart: it is as injective, and covers exactly the same place.
 
 mod boundary;
 mod crossings;
 mod nesting;
+mod stacking;
 
 use std::fmt;
 
@@ -40,7 +52,7 @@ use crate::packing::Tile;
 use crate::predicates;
 use crate::progress::{Cancelled, Progress};
 
-use boundary::{Boundary, Vertices};
+use stacking::{Stacking, Triangles};
 
 /// How many elements of a layout break a rule, and the first of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,7 +96,8 @@ pub struct Certificate {
     /// Triangles with a corner that is outside the unit square or not finite; where the texture has several tiles, outside the tile in which the triangle
     /// of its chart with the lowest number lies, since a chart must not cross the border of a tile.
     pub out_of_range: Defect<u32>,
-    /// Triangles that are not strictly positive: they are turned over or have no area.
+    /// Triangles that are not strictly positive: they are turned over or have no area. Of a chart that lies on another
+    /// in a stack, all are to be positive, or all negative, as its triangle with the lowest number is.
     pub flipped: Defect<u32>,
     /// Pairs of boundary edges of one chart that cross or touch, except where one follows the other. Each is named by the
     /// triangles of the two edges, the lower number first. A vertex that a boundary visits twice counts, too.
@@ -97,10 +110,16 @@ pub struct Certificate {
     /// Labels of the charts that do not have exactly one positively oriented boundary loop, because they are in pieces or
     /// turned inside out.
     pub bad_loops: Defect<i32>,
+    /// Number of charts that share their place with others on purpose.
+    pub stacked: usize,
+    /// Labels of the charts that do not cover exactly the same place as the chart of their stack that they are compared
+    /// with.
+    pub apart: Defect<i32>,
     /// Labels of all charts that break a rule, in ascending order.
     pub faulty_charts: Vec<i32>,
-    /// Least distance between the boundaries of different charts in texels. Unlike the checks, it is subject to rounding. A
-    /// distance above eight texels and above twice the margin is given as the larger of these two values.
+    /// Least distance in texels between the boundaries of different charts that are not of one stack. Unlike the
+    /// checks, it is subject to rounding. A distance above eight texels and above twice the margin is given as the
+    /// larger of these two values.
     pub gap_texels: f64,
     /// The margin: the value that `gap_texels` has to reach.
     pub margin_texels: f64,
@@ -122,6 +141,7 @@ impl fmt::Display for Certificate {
             (self.crossings_between.count, ["crossing between charts", "crossings between charts"]),
             (self.nested.count, ["chart within another", "charts within others"]),
             (self.bad_loops.count, ["chart without one outer boundary", "charts without one outer boundary each"]),
+            (self.apart.count, ["chart not exactly on its stack", "charts not exactly on their stacks"]),
         ];
         let mut found: Vec<String> = counts
             .into_iter()
@@ -139,20 +159,22 @@ impl fmt::Display for Certificate {
 }
 
 impl Certificate {
-    /// Whether the layout is proven to be injective, to lie in the unit square or its tiles and to keep the margin.
+    /// Whether the layout is proven to be injective but for its stacks, to lie in the unit square or its tiles and to
+    /// keep the margin.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         self.is_injective() && self.keeps_margin()
     }
 
-    /// Whether charts are at least the margin apart.
+    /// Whether charts that are not of one stack are at least the margin apart.
     #[must_use]
     pub fn keeps_margin(&self) -> bool {
         // NaN keeps nothing.
         self.complete && self.gap_texels >= self.margin_texels
     }
 
-    /// Whether the layout is proven to be injective and to lie in the unit square or, chart by chart, in its tiles.
+    /// Whether the layout is proven to be injective, but for charts that lie exactly on another one of their stack, and
+    /// to lie in the unit square or, chart by chart, in its tiles.
     #[must_use]
     pub fn is_injective(&self) -> bool {
         self.complete
@@ -162,6 +184,7 @@ impl Certificate {
             && self.crossings_between.count == 0
             && self.nested.count == 0
             && self.bad_loops.count == 0
+            && self.apart.count == 0
     }
 }
 
@@ -185,12 +208,12 @@ pub(crate) fn verify(mesh: &UvMesh, progress: &Progress) -> Result<Certificate, 
     // The tile of each chart.
     let mut home: Vec<Option<Tile>> = vec![None; labels.len()];
 
-    // The triangles with a chart and finite UVs.
-    let mut corners: Vec<[Point; 3]> = Vec::with_capacity(m);
-    let mut source: Vec<u32> = Vec::with_capacity(m);
-    let mut chart: Vec<u32> = Vec::with_capacity(m);
+    let stacking = Stacking::of(mesh, &labels);
+    out.stacked = stacking.stacked();
+    // The triangles with a chart and finite UVs, those of charts that lie on others apart.
+    let (mut below, mut above) = (Triangles::default(), Triangles::default());
     for f in 0..m {
-        let Some(uv) = mesh.corner_uv(f) else {
+        let Some(mut uv) = mesh.corner_uv(f) else {
             out.unmapped.add(f as u32);
             continue;
         };
@@ -206,27 +229,34 @@ pub(crate) fn verify(mesh: &UvMesh, progress: &Progress) -> Result<Certificate, 
             faulty[c] = true;
         }
         let finite = uv.iter().flatten().all(|x| x.is_finite());
+        if finite && stacking.is_mirrored(c) {
+            uv.swap(1, 2);
+        }
         if !finite || orientation(uv[0], uv[1], uv[2]) <= 0 {
             out.flipped.add(f as u32);
             faulty[c] = true;
         }
         if finite {
-            corners.push(uv);
-            source.push(f as u32);
-            chart.push(c as u32);
+            let to = if stacking.lies_on(c).is_some() { &mut above } else { &mut below };
+            to.push(uv, f as u32, c as u32);
         }
     }
     progress.check()?;
 
-    let vertices = Vertices::new(&corners, &chart);
-    let boundary = Boundary::new(&vertices, &chart, &source, labels.len());
+    let boundary = below.boundary(labels.len());
     progress.check()?;
+    if !above.is_empty() {
+        for c in stacking.apart(&boundary, &above.boundary(labels.len())) {
+            out.apart.add(labels[c]);
+            faulty[c] = true;
+        }
+    }
     for &(a, b, c) in &boundary.pinches {
         out.crossings_inside.add((a.min(b), a.max(b)));
         faulty[c as usize] = true;
     }
     for (c, &positive) in boundary.positive_loops.iter().enumerate() {
-        if positive != 1 {
+        if positive != 1 && stacking.lies_on(c).is_none() {
             out.bad_loops.add(labels[c]);
             faulty[c] = true;
         }

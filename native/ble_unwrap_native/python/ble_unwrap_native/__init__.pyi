@@ -71,6 +71,8 @@ class _ChartsGroup(TypedDict, total=False):
     """Which side is looked at most. "none": No side more than another. "x": Seams are drawn away from what faces along X. "-x": Seams are drawn away from what faces against X. "y": Seams are drawn away from what faces along Y. "-y": Seams are drawn away from what faces against Y, as the faces of figures do in Blender. "z": Seams are drawn away from what faces along Z. "-z": Seams are drawn away from what faces against Z."""
     symmetry: Literal["auto", "off"]
     """Whether seams of mirrored surfaces are mirrored, too. "auto": Where a piece has a mirror plane along edges, so have its seams. "off": Seams are found without regard to mirror planes."""
+    stack: Literal["off", "equal", "mirrored"]
+    """Which charts lie on each other, so that like parts share their pixels and all charts get more of them. "off": Every chart has a place of its own. "equal": Charts of equal parts lie exactly on each other and share their pixels. "mirrored": Charts of mirrored parts and mirrored halves do so, too; there, the texture is mirrored on the surface."""
     style: Literal["auto", "organic", "hard"]
     """Whether planes, cylinders and the like between hard edges keep their shape. "auto": Parts between hard edges that can lie flat without stretch do so if most of a connected piece is made of them, and so do planes and walls between bevels; else only large planes do. "organic": Hard edges are not treated specially. "hard": All parts between hard edges lie flat without stretch, but for thin rings that become strips, whatever the piece is made of; edges count as hard from 40° instead of 50°."""
     straighten: float
@@ -264,8 +266,12 @@ class Array(Buffer):
 
 @final
 class Atlas:
-    def __new__(cls, uv: Array, chart: Array, report: dict[str, Any], certificate: dict[str, Any], /) -> Atlas: ...
-    def __reduce__(self) -> tuple[type[Atlas], tuple[Array, Array, dict[str, Any], dict[str, Any]]]: ...
+    def __new__(
+        cls, uv: Array, chart: Array, stack: Array, report: dict[str, Any], certificate: dict[str, Any], /
+    ) -> Atlas: ...
+    def __reduce__(self) -> tuple[type[Atlas], tuple[Array, Array, Array, dict[str, Any], dict[str, Any]]]: ...
+    @property
+    def stack(self) -> Array: ...
     @property
     def certificate(self) -> dict[str, Any]: ...
     @property
@@ -431,6 +437,7 @@ def measure(
     uv: Buffer,
     *,
     chart: Buffer | None = None,
+    stacks: Buffer | None = None,
     corner_triangles: Buffer | None = None,
     job: Job | None = None,
     **settings: Unpack[_MeasureSettings],
