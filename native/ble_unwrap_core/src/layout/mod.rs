@@ -1,6 +1,7 @@
 //! Charts to atlas: scale, pack, round, check, and mend what the checks find.
 
 mod mend;
+mod narrow;
 mod placed;
 mod quads;
 mod scale;
@@ -41,13 +42,15 @@ pub(crate) fn lay_out(
     run: &Run<'_>,
 ) -> Result<Atlas, UnwrapError> {
     let arrays = LayoutArrays::new(input, surface);
-    let texture = Texture::of(&settings.packing);
-    let mut packing = settings.packing.clone();
+    let mut texture = Texture::of(&settings.packing);
+    let mut packing = settings.packing.with_whole_margin();
     let mut round = 0;
     loop {
         run.progress.enter(Stage::Pack);
         scale::scale(&mut charts, settings);
-        let layout = Placed::new(input, surface, &charts, &packing, run.progress)?;
+        let layout = Placed::new(input, surface, &charts, &packing, settings.chart_limit(), run.progress)?;
+        // Where the margin may shrink, less is kept than was asked for, and that is proven.
+        texture.margin = texture.margin.min(layout.margin);
         clock.lap("pack");
         run.progress.enter(Stage::Verify);
         let mesh = arrays.uv_mesh(&layout.uv, &layout.face_chart, texture)?;
@@ -58,7 +61,7 @@ pub(crate) fn lay_out(
                 drop(charts);
                 let measures = metrics::measure(&mesh, run.progress)?;
                 clock.lap("verify");
-                let mut report = summary::report_of(input, surface, &layout, &measures, settings);
+                let mut report = summary::report_of(input, surface, &layout, &measures, settings, run.progress)?;
                 report.rungs = rungs.taken();
                 report.seconds = clock.into_laps();
                 let atlas = Atlas::proven(layout.uv, layout.polygon_chart, report, certificate)?;
