@@ -240,6 +240,7 @@ def test_what_is_no_rectangle_keeps_its_shape():
     at = texels(result.uv, 512)
     caps = [faces_of(arrays, result, number)[0] for number in range(8)]
     caps = [corners for corners in caps if len(corners) == 6]
+    assert result.report["snapped_charts"] == 6
     for corners in caps:
         sides = np.linalg.norm(at[corners] - np.roll(at[corners], 1, axis=0), axis=1)
         assert_allclose(sides, sides.mean(), rtol=1e-4)
@@ -327,6 +328,8 @@ def test_pack_leaves_charts_alone_unless_asked():
     plain = native.pack(*arrays, texture_size=128)
     assert_array_equal(np.asarray(plain.uv), np.asarray(native.pack(*arrays, texture_size=128, snap=False).uv))
     assert off_texels(texels(plain.uv, 128)) > 0
+    with pytest.raises(native.InvalidArgumentError, match="a margin of 40 texels leaves no room"):
+        native.pack(*arrays, texture_size=40, margin=40, snap=True)
     raised = native.pack(*arrays, texture_size=128, mip_levels=2, rotation="none")
     same = native.pack(*arrays, texture_size=128, margin=8 * np.sqrt(2), rotation="none")
     assert_array_equal(np.asarray(raised.uv), np.asarray(same.uv))

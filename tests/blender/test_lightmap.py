@@ -40,6 +40,7 @@ def test_a_lightmap_has_a_second_map_and_leaves_the_first_alone():
     lines = certificate()
     assert ("INFO", "6 faces in 6 charts") in [tuple(line) for line in lines]
     assert any("margin 11.3" in text for status, text in lines if status == "OK")
+    assert ("INFO", "6 rectangles on whole texels") in [tuple(line) for line in lines]
     assert not [text for status, text in lines if status == "WARN"]
 
 

@@ -63,6 +63,9 @@ pub struct Report {
     pub atlas_limit: Option<f64>,
     /// Charts whose L2 stretch is above `chart_limit`: number and L2 stretch of each, in ascending order of the numbers.
     pub charts_over_limit: Vec<(usize, f64)>,
+    /// Number of charts whose sides lie on the edges of texels, with
+    /// [`PackSettings::snap`](crate::settings::PackSettings::snap).
+    pub snapped_charts: usize,
     /// Charts that fit between two parallel lines less than two texels apart: their numbers, ascending. A texture can
     /// show little of what is on them.
     pub narrow_charts: Vec<usize>,

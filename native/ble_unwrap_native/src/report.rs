@@ -33,6 +33,7 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'
         chart_limit,
         atlas_limit,
         charts_over_limit,
+        snapped_charts,
         narrow_charts,
         warnings,
         ..
@@ -63,6 +64,7 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'
     dict.set_item("chart_limit", chart_limit)?;
     dict.set_item("atlas_limit", atlas_limit)?;
     dict.set_item("charts_over_limit", charts_over_limit)?;
+    dict.set_item("snapped_charts", snapped_charts)?;
     dict.set_item("narrow_charts", narrow_charts)?;
     dict.set_item("warnings", warnings)?;
     Ok(dict)

@@ -165,7 +165,8 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 ///     ``unmapped_faces``, ``l2``, ``l2_chart_scale``, ``l2_worst_chart``, ``l_infinity``, ``angle_distortion``,
 ///     ``area_distortion``, ``flips``, ``bent_quads``, ``overlaps``, ``seam_length``, ``packing_efficiency``, ``tiles``, ``texels_per_unit``,
 /// ``gap_texels``, ``margin_texels`` (what was to be kept), ``chart_limit``, ``atlas_limit``, ``charts_over_limit``,
-/// ``narrow_charts`` (numbers of those narrower than two texels), ``rungs``, ``seconds``, ``warnings`` and more.
+/// ``snapped_charts`` (how many), ``narrow_charts`` (numbers of those narrower than two texels), ``rungs``,
+/// ``seconds``, ``warnings`` and more.
 ///
 /// Raises
 /// ------

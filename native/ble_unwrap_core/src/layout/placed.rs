@@ -14,6 +14,7 @@ use crate::stretch;
 use super::quads;
 
 /// Charts packed and rounded.
+#[derive(Default)]
 pub(super) struct Placed {
     pub(super) uv: Vec<[f32; 2]>,
     pub(super) face_chart: Vec<i32>,
@@ -25,6 +26,8 @@ pub(super) struct Placed {
     pub(super) shortfall: Option<Shortfall>,
     /// The margin that was kept, in texels.
     pub(super) margin: f64,
+    /// Number of charts laid on whole texels.
+    pub(super) snapped: usize,
 }
 
 impl Placed {
@@ -47,6 +50,7 @@ impl Placed {
             texels_per_unit: packed.texels_per_unit,
             shortfall: packed.shortfall,
             margin: packed.margin,
+            snapped: 0,
         };
         for (number, chart) in charts.iter().enumerate() {
             progress.check()?;
@@ -55,6 +59,7 @@ impl Placed {
                 packed.unsnap(number);
                 exact = packed.uvs(number, &chart.uv);
             }
+            layout.snapped += usize::from(packed.is_snapped(number));
             let texel = size.map(|s| 1.0 / s);
             let rounding = Rounding { texel, corner: packed.tiles[number].corner(), diagonal: surface.diagonal };
             let halves = quads::convex_halves(chart);

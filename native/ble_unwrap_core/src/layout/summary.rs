@@ -50,6 +50,7 @@ pub(super) fn report_of(
     let narrow = Narrow::of(input, layout, &settings.packing, progress)?;
     report.warnings.extend(narrow.warning());
     report.narrow_charts = narrow.charts;
+    report.snapped_charts = layout.snapped;
     report.margin_texels = settings.packing.margin().min(layout.margin);
     report.warnings.extend(packing::told_of_margin(settings.packing.margin(), layout.margin));
     Ok(report)

@@ -537,6 +537,7 @@ pub(crate) fn pack_within(
             Err(error) if asked.shrink_margin && shrink::helps(&error) && asked.margin_texels > 0.0 => {
                 asked.margin_texels = shrink::smaller(asked.margin_texels);
             }
+            Err(error) if asked.snap => return Err(shrink::with_margin(error, asked.margin_texels)),
             found => return found,
         }
     }

@@ -13,6 +13,20 @@ pub(super) fn helps(error: &PackError) -> bool {
     )
 }
 
+/// The error with the margin that was asked for, where more room was kept for [snapping](super::snap).
+pub(super) fn with_margin(error: PackError, margin: f64) -> PackError {
+    match error {
+        PackError::MarginTooLarge { width, height, .. } => PackError::MarginTooLarge { margin, width, height },
+        PackError::TooManyCharts { charts, width, height, .. } => {
+            PackError::TooManyCharts { charts, margin, width, height }
+        }
+        PackError::NoRoomBetweenObstacles { charts, width, height, .. } => {
+            PackError::NoRoomBetweenObstacles { charts, margin, width, height }
+        }
+        other => other,
+    }
+}
+
 /// The next margin to try: half of it, and none at last.
 pub(super) fn smaller(margin: f64) -> f64 {
     if margin >= 2.0 * LEAST { 0.5 * margin } else { 0.0 }
@@ -64,6 +78,8 @@ mod tests {
         let (tight, loose) = (square(32, 20.0), square(256, 4.0));
         let refused = pack(&items(&charts), &tight, &Progress::new());
         assert!(refused.is_err_and(|error| helps(&error)));
+        let refused = pack(&items(&charts), &PackSettings { snap: true, ..tight.clone() }, &Progress::new());
+        assert!(refused.is_err_and(|error| error.to_string().contains("a margin of 20 texels")));
         for snap in [false, true] {
             let allowed = PackSettings { shrink_margin: true, snap, ..tight.clone() };
             let found = packed(&charts, &allowed);
