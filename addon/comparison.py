@@ -85,17 +85,18 @@ def compare(objects, settings, *, angles=ANGLES, threads=0, progress=None):
         # By the images of the maps that are there: the new ones, which both layouts come into, have none.
         maps = [layer.name if (layer := obj.data.uv_layers.active) else None for obj in objects]
         settings["texture_size"], _ = textures.proportioned_size(objects, maps, settings["texture_size"])
-    target = {"margin": settings["margin"], "texture_size": settings["texture_size"]}
+    target = {"texture_size": settings["texture_size"]}
     activate_map(objects, BLE_MAP)
     outcome = unwrap_objects(objects, settings, threads=threads, progress=progress)
     rows = {"ble_unwrap": {**outcome.certificate.measured, "seconds_total": outcome.seconds}}
     rows["ble_unwrap"]["violations"] = outcome.certificate.violations
     rows["ble_unwrap"]["seconds"] = outcome.report.get("seconds")
     rows["ble_unwrap"]["blender_overlapping_faces"] = overlapping_faces(objects)
+    target["margin"] = outcome.report["margin_texels"]  # mip levels may have raised it
     by_angle, best = best_smart_uv(objects, angles=angles, map_name=SMART_MAP, **target)
     for measured in by_angle.values():
         measured["violations"] = surface_report.certify(
-            measured, margin=settings["margin"], stretch_limit=settings["stretch_limit"]
+            measured, margin=target["margin"], stretch_limit=settings["stretch_limit"]
         ).violations
     by_angle[best]["blender_overlapping_faces"] = overlapping_faces(objects)
     rows["smart_uv_best"] = {**by_angle[best], "angle": best}

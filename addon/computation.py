@@ -6,6 +6,9 @@ import numpy as np
 
 from . import engine, kept_analysis
 
+# Settings that a mesh is analysed with, and those that come with a preset.
+ANALYSED = ("preset", "weld", "weld_distance", "cut_angle")
+
 
 @dataclass
 class Result:
@@ -42,8 +45,8 @@ def _caller(name, mesh, settings, keep):
     """A call of the function `name` of the native module, or where the analysis is kept of its method."""
     settings = engine.native_settings(settings)
     if keep:
-        welding = {"weld": settings.pop("weld", False), "weld_distance": settings.pop("weld_distance", None)}
-        analysis = kept_analysis.of(*mesh, welding, settings.get("threads", 0))
+        analysed = {name: settings[name] for name in ANALYSED if name in settings}
+        analysis = kept_analysis.of(*mesh, analysed, settings.get("threads", 0))
         return lambda module: getattr(analysis, name)(**settings)
     return lambda module: getattr(module, name)(*mesh[0], **mesh[1], **settings)
 

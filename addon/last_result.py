@@ -31,11 +31,19 @@ class BLEUnwrapCertificate(bpy.types.PropertyGroup):
     opposed: IntProperty(
         name="Edges", description="Edges between faces that turn against each other", options={"SKIP_SAVE"}
     )
+    narrow: StringProperty(
+        name="Narrow", description="JSON list of [object, session_uid, faces in narrow charts]", options={"SKIP_SAVE"}
+    )
+    narrow_charts: IntProperty(name="Charts", description="Charts narrower than two texels", options={"SKIP_SAVE"})
     holds: BoolProperty(name="Holds", description="The UVs are those that were measured", options={"SKIP_SAVE"})
 
 
-def show(context, title, lines, maps):
-    """Puts up a certificate; `maps` are the objects it is of, each with the name of its map."""
+def show(context, title, lines, maps, narrow=(), narrow_charts=0):
+    """Puts up a certificate; `maps` are the objects it is of, each with the name of its map.
+
+    `narrow` are objects with the numbers of their faces in charts narrower than two texels, of which there are
+    `narrow_charts`.
+    """
     shown = context.window_manager.ble_unwrap_certificate
     shown.title = title
     shown.lines = json.dumps(lines)
@@ -45,6 +53,8 @@ def show(context, title, lines, maps):
     meshes = [obj.data for obj, _ in maps if obj.type == "MESH"]
     shown.crowded = sum(int(crowded_edges(mesh).sum()) for mesh in meshes)
     shown.opposed = sum(int(opposed_edges(mesh).sum()) for mesh in meshes)
+    shown.narrow = json.dumps([(obj.name, obj.session_uid, [int(face) for face in faces]) for obj, faces in narrow])
+    shown.narrow_charts = narrow_charts
     shown.holds = True
 
 
@@ -64,6 +74,13 @@ def objects(context):
     entries = json.loads(context.window_manager.ble_unwrap_certificate.maps or "[]")
     found = (_find(name, uid) for name, uid, *_ in entries)
     return [obj for obj in found if obj is not None]
+
+
+def narrow_faces(context):
+    """The objects of the certificate that have faces in narrow charts: object -> numbers of these faces."""
+    entries = json.loads(context.window_manager.ble_unwrap_certificate.narrow or "[]")
+    found = {_find(name, uid): faces for name, uid, faces in entries}
+    return {obj: faces for obj, faces in found.items() if obj is not None}
 
 
 def _find(name, uid):

@@ -348,6 +348,15 @@ def of_selection(selection, held):
     return result
 
 
+def by_part(selection, is_meant):
+    """From flags of the selection's faces, (f,) bool, the numbers of those meant in the mesh of each part, a list."""
+    found = []
+    for part in selection.parts:
+        faces = np.flatnonzero(is_meant[part.faces]).astype(np.int32)
+        found.append(faces if part.source_faces is None else part.source_faces[faces])
+    return found
+
+
 def kept_faces(selection, held):
     """The faces of the selection's meshes that are not in it and have finite UVs, given the UVs of whole meshes.
 

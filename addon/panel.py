@@ -82,6 +82,9 @@ class _Certificate:
             if count:
                 text = f"Select {count:,} Edge{'' if count == 1 else 's'} {what}"
                 self.layout.operator("mesh.ble_unwrap_select_edges", text=text, icon="EDGESEL").kind = kind
+        if narrow := certificate.narrow_charts:
+            text = f"Select {narrow:,} Narrow Chart{'' if narrow == 1 else 's'}"
+            self.layout.operator("mesh.ble_unwrap_select_narrow", text=text, icon="FACESEL")
 
 
 class _Advanced:

@@ -14,8 +14,13 @@ from . import settings_table
 # What an artist wants of the result whatever the method: presets leave these alone, and the native module, whose
 # presets have values of their own for them, always gets them.
 KEPT_BY_PRESETS = ("stretch_limit", "texture_size", "margin", "tiles", "texel_density")
+# Preset -> the UV map that it is for: a lightmap has its own beside that of the materials, found again by its name.
+PRESET_MAPS = {"LIGHTMAP": {"uv_map": "NEW", "uv_map_name": "Lightmap"}}
 # Preset -> what it differs in from the defaults; shown in the panel when the preset is chosen.
-PRESET_VALUES = {preset: settings_table.differences(preset, KEPT_BY_PRESETS) for preset in settings_table.PRESETS}
+PRESET_VALUES = {
+    preset: settings_table.differences(preset, KEPT_BY_PRESETS) | PRESET_MAPS.get(preset, {})
+    for preset in settings_table.PRESETS
+}
 
 
 def declared(name, **presentation):
@@ -42,6 +47,11 @@ def _apply_preset(settings, _context):
     for name in annotations():
         if name not in (*BRIDGE_SETTINGS, *KEPT_BY_PRESETS, "preset"):
             settings.property_unset(name)
+    for chosen in PRESET_MAPS.values():
+        # Another preset is not to write the map that the one before was for.
+        if all(getattr(settings, name) == value for name, value in chosen.items()):
+            for name in chosen:
+                settings.property_unset(name)
     for name, value in PRESET_VALUES.get(settings.preset, {}).items():
         setattr(settings, name, value)
 
@@ -53,7 +63,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
         name="Preset",
         description=(
             "How it is done: values of all settings but stretch limit, texture size, margin, tiles, texel density and "
-            "the result's"
+            "the result's; a lightmap also gets a UV map of its own"
         ),
         items=settings_table.preset_items(),
         default="DEFAULT",
@@ -68,6 +78,9 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     rotation: declared("rotation")
     stack: declared("stack")
     quality: declared("quality")
+    mip_levels: declared("mip_levels")
+    shrink_margin: declared("shrink_margin")
+    snap: declared("snap")
     tiles: declared("tiles", soft_max=20)
     # Lengths are those of the scene, in its units: objects are unwrapped at the scale that they have there.
     texel_density: declared("texel_density", soft_max=8192.0, step=1000, precision=3)
@@ -186,6 +199,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     # ---- charts
     weld: declared("weld")
     weld_distance: declared("weld_distance", soft_max=1.0, step=0.1, precision=6, unit="LENGTH")
+    cut_angle: declared("cut_angle", step=100, precision=1)
     coarse: declared("coarse")
     stretch_price: declared("stretch_price", soft_max=100.0, step=100, precision=2)
     hide_seams: declared("hide_seams", soft_max=4.0, step=10, precision=2)
@@ -245,7 +259,7 @@ ADVANCED_SETTINGS = (
     (
         "Borders",
         (
-            *("use_sharp", "use_materials", "sharp_angle"),
+            *("cut_angle", "use_sharp", "use_materials", "sharp_angle"),
             *("follow_seams", "follow_sharp", "follow_materials", "crease_weight"),
             *("seams_away", "seams_here", "hide_seams", "front", "symmetry", "style", "straighten"),
         ),
@@ -260,7 +274,7 @@ ADVANCED_SETTINGS = (
     ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max", "together_max")),
     ("Embedding", ("model", "kernel_width", "relaxation", "max_sweeps", "tolerance", "update", "initial")),
     ("Stretch", ("stretch_solver", "stretch_iterations")),
-    ("Packing", ("stack", "quality", "tiles", "texel_density")),
+    ("Packing", ("stack", "quality", "mip_levels", "shrink_margin", "snap", "tiles", "texel_density")),
 )
 
 
@@ -308,11 +322,14 @@ def copy_changed(source, target):
 def values(settings):
     """Settings as plain values; those of the native module only where they were set, so that its presets hold."""
     always = (*BRIDGE_SETTINGS, *KEPT_BY_PRESETS, "preset")
-    return {
+    found = {
         name: _plain(name, getattr(settings, name))
         for name in annotations()
         if name in always or settings.is_property_set(name)
     }
+    chosen = PRESET_MAPS.get(settings.preset, {})
+    unset = {name: value for name, value in chosen.items() if not settings.is_property_set(name)}
+    return found | unset
 
 
 def _plain(name, value):

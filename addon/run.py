@@ -1,6 +1,6 @@
 """All that one press of the button does: the surfaces together, then every cloud by itself, written all or none."""
 
-from . import cloud_bridge, engine, modifiers, targets, uv_maps
+from . import cloud_bridge, engine, modifiers, properties, targets, uv_maps
 from .cloud_task import CloudTask
 from .mesh_arrays import MeshError, NothingToUnwrap
 from .task import UnwrapTask, finished
@@ -27,7 +27,8 @@ class Run:
                 obj.update_from_editmode()  # faces may have been made or deleted since edit mode was entered
         self.tasks, self.notes = [], []
         reasons = []
-        objects, refused = _writable(objects, uv_maps.chosen(settings))
+        defaults = properties.default_values(settings["preset"])
+        objects, refused = _writable(objects, uv_maps.chosen({**defaults, **settings}))
         surfaces = [obj for obj in objects if targets.is_surface(obj)]
         for group in [surfaces] if one_atlas and surfaces else [[obj] for obj in surfaces]:
             try:
@@ -85,6 +86,16 @@ class Run:
         """Every object that was written with the name of its map, after `write`."""
         pairs = zip(self.tasks, outcomes, strict=True)
         return [pair for task, outcome in pairs for pair in zip(task.written, outcome.maps, strict=True)]
+
+    def narrow_faces(self, outcomes):
+        """Every object with faces of charts narrower than two texels, and the numbers of these, after `write`."""
+        pairs = zip(self.tasks, outcomes, strict=True)
+        return [
+            (obj, faces)
+            for task, outcome in pairs
+            for obj, faces in zip(task.written, outcome.narrow_faces, strict=False)
+            if len(faces)
+        ]
 
 
 class RunJob:

@@ -82,7 +82,10 @@ def found(report):
         "copied": lambda count: f"{counted(count, 'piece')} with the map of another one like them",
         "straighten": lambda count: f"{counted(count, 'chart')} with sides laid along the axes",
     }
-    return [text(rungs[name]) for name, text in said.items() if rungs.get(name)]
+    lines = [text(rungs[name]) for name, text in said.items() if rungs.get(name)]
+    if snapped := report.get("snapped_charts"):
+        lines.append(f"{counted(snapped, 'rectangle')} on whole texels")
+    return lines
 
 
 def lines(certificate, *, margin, stretch_limit, limit_over="CHART", notes=(), length_text="{:.4g}".format):

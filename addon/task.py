@@ -1,7 +1,7 @@
 """One unwrap of surfaces, from objects to certificate: what the operator and the command line share."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -24,6 +24,8 @@ class Outcome:
     summary: str
     lines: list
     maps: list  # name of the UV map or point attribute of every object
+    # Numbers of the faces of every object that are in charts narrower than two texels; empty for points.
+    narrow_faces: list = field(default_factory=list)
 
 
 class Timer:
@@ -78,6 +80,11 @@ class UnwrapTask:
         for obj, (name, there) in zip(objects, maps, strict=True):
             if there and (note := textures.replaced_note(obj, name)):
                 self.selection.warnings.append(note)
+            if self.settings["preset"] == "LIGHTMAP" and not any(layer.name != name for layer in obj.data.uv_layers):
+                self.selection.warnings.append(
+                    f"{obj.name}: {name} is its only UV map; engines look for lightmaps in the second one, so unwrap "
+                    "it for its materials into another one first"
+                )
         if self.settings["correct_aspect"]:
             # The first map of a mesh becomes the one that textures use.
             names = [name if obj.data.uv_layers else None for obj, (name, _) in zip(objects, maps, strict=True)]
@@ -88,7 +95,8 @@ class UnwrapTask:
     def _keep_place(self):
         """Packs for the part of the texture that the old UVs fill, so that margin and density come out right."""
         held = mesh_bridge.read_uvs(self.selection, self.target)
-        self.bounds, why_not = bounds_to_keep(held, self.settings["texture_size"])
+        snap = self.settings["snap"]
+        self.bounds, why_not = bounds_to_keep(held, self.settings["texture_size"], whole_texels=snap)
         if self.bounds is not None and self.native["tiles"] > 1 and self.bounds.extent.max() > 1.0:
             self.bounds = None
             why_not = "The old UVs take more than one tile, so no place was kept; all tiles were used"
@@ -141,14 +149,15 @@ class UnwrapTask:
         marks = {"mark_seams": self.settings["mark_seams"], "chart": stacks and stacks[0]}
         whole = mesh_bridge.write_uvs(self.selection, uv, target=self.target, **marks)
         held = mesh_bridge.of_selection(self.selection, whole)
-        margin = self.settings["margin"]
+        margin = result.report["margin_texels"]  # mip levels may have raised it
         limit = {name: self.settings[name] for name in ("stretch_limit", "limit_over")}
         measured = result.report
         warnings = [*self.selection.warnings, *result.report.get("warnings", ())]
         if measure_again:
-            given = {name: self.settings[name] for name in ("texture_size", "margin", "tiles", "weld", "weld_distance")}
+            given = {name: self.settings[name] for name in ("texture_size", "tiles", "weld", "weld_distance")}
             try:
-                measured = measurement.measure(self.selection, held, stacks=stacks, **given)
+                measured = measurement.measure(self.selection, held, margin=margin, stacks=stacks, **given)
+                measured["margin_texels"] = margin
                 measured |= {name: result.report[name] for name in ("texels_per_unit", "stacked", "stacks")}
             except engine.EngineError as error:  # the UVs are written: say what is known
                 warnings.append(f"The written UVs could not be measured: {error}")
@@ -171,6 +180,9 @@ class UnwrapTask:
             summary=surface_report.summary(measured, seconds),
             lines=surface_report.lines(certificate, margin=margin, **limit, notes=notes, length_text=units.length_text),
             maps=mesh_bridge.active_maps(self.selection),
+            narrow_faces=mesh_bridge.by_part(
+                self.selection, np.isin(result.chart, np.array(result.report["narrow_charts"], np.int32))
+            ),
         )
 
     def _overlaps(self, held, kept, stacks):
@@ -192,14 +204,20 @@ class Bounds:
     pixels: tuple
 
 
-def bounds_to_keep(uv, texture_size):
-    """The rectangle that UVs (n, 2) fill, in whole pixels, and None; or None and why there is nothing to pack into."""
+def bounds_to_keep(uv, texture_size, *, whole_texels=False):
+    """The rectangle that UVs (n, 2) fill, in whole pixels, and None; or None and why there is nothing to pack into.
+
+    With `whole_texels` its lower corner, too, is where texels of the texture meet, as their sides are to be.
+    """
     if uv is None or not np.isfinite(uv).all():
         return None, "There were no old UVs whose place could be kept; the whole texture was used"
     low, high = uv.min(axis=0).astype(float), uv.max(axis=0).astype(float)
     if (high - low).min() < SMALLEST_BOUNDS:
         return None, "The old UVs lie on one line or point, so they have no place to keep; the whole texture was used"
-    pixels = np.maximum(1, np.floor((high - low) * texture_size)).astype(int)
+    if whole_texels:
+        # What is a thousandth of a pixel off is so by rounding to single precision.
+        low = np.ceil(low * texture_size - 1e-3) / texture_size
+    pixels = np.maximum(1, np.floor((high - low) * texture_size + (1e-3 if whole_texels else 0.0))).astype(int)
     return Bounds(low, pixels / texture_size, (int(pixels[0]), int(pixels[1]))), None
 
 

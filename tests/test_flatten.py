@@ -129,6 +129,7 @@ def flatten_settings(preset):
     unwraps = {"stretch_limit", "limit_over", "coarse", "moves", "stretch_price", "holes", "chart_scale"}
     unwraps |= {"hide_seams", "front", "symmetry", "stack", "style", "straighten"}
     unwraps |= {"crease_weight", "margin", "texture_size", "rotation", "quality", "tiles", "texel_density"}
+    unwraps |= {"cut_angle", "mip_levels", "snap", "shrink_margin"}
     return {name: value for name, value in native.default_settings(preset).items() if name not in unwraps}
 
 

@@ -308,7 +308,7 @@ def test_a_given_setting_beats_the_preset(ball):
         ("seed", True, "found True"),
         ("holes", "fill", "holes: expected 'keep' or 'cut'; found 'fill'"),
         ("model", 3, "model: expected 'default', 'paper' or 'isomap'; found 3"),
-        ("preset", "best", "preset: expected 'default', 'paper' or 'iso_charts'; found 'best'"),
+        ("preset", "best", "preset: expected 'default', 'paper', 'iso_charts' or 'lightmap'; found 'best'"),
         ("kernel_width", 0, "or None for the model's own; found 0"),
         ("landmark_min", 2, "landmark_min: expected a whole number from 3 to 100000; found 2"),
         ("landmark_max", 1, "or None for no limit; found 1"),
@@ -334,7 +334,8 @@ def test_unknown_settings_are_named_with_near_ones(square):
         unwrap(*square, zzz=1)
     with pytest.raises(native.InvalidArgumentError, match=r"pack\(\) has no setting 'stretch_limit'"):
         native.pack(np.zeros((0, 2)), np.zeros((0, 3), np.int32), np.zeros(0, np.int32), stretch_limit=1.2)
-    with pytest.raises(native.InvalidArgumentError, match="preset: expected 'default', 'paper' or 'iso_charts'"):
+    presets = "'default', 'paper', 'iso_charts' or 'lightmap'"
+    with pytest.raises(native.InvalidArgumentError, match=f"preset: expected {presets}"):
         native.default_settings("artist")
 
 

@@ -71,7 +71,7 @@ def at_the_ends(row):
 def call(name, value):
     # What contradicts the value otherwise: too few landmarks at most, and a margin as wide as the texture.
     others = {"landmark_min": {"landmark_max": None}, "landmark_max": {"landmark_min": 3}}
-    others |= {"texture_size": {"margin": 0}, "margin": {"texture_size": 4096}}
+    others |= {"texture_size": {"margin": 0}, "margin": {"texture_size": 4096}, "mip_levels": {"texture_size": 4096}}
     return native.unwrap(*EMPTY_MESH, **others.get(name, {}), **{name: value})
 
 
@@ -223,5 +223,6 @@ def test_tooltips_end_without_a_full_stop_and_say_what_0_stands_for(settings_tab
         "kernel_width",
         "weld_distance",
         "texel_density",
+        "cut_angle",
     }
     assert "limit_over" in settings_table.taken_by("unwrap") - settings_table.taken_by("unwrap_points")

@@ -208,7 +208,9 @@ def add_baseline(asset, run, settings):
             continue
         group = task.objects
         active = [obj.data.uv_layers.active.name for obj in group]
-        results, best = comparison.best_smart_uv(group, margin=full["margin"], texture_size=full["texture_size"])
+        # As wide as mip levels made it.
+        margin = entry["measured"].get("margin_texels", full["margin"])
+        results, best = comparison.best_smart_uv(group, margin=margin, texture_size=full["texture_size"])
         entry["baseline_smart_uv"] = {"best_angle": best, "by_angle": results}
         for obj, name in zip(group, active, strict=True):
             obj.data.uv_layers.remove(obj.data.uv_layers[comparison.SMART_MAP])

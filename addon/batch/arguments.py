@@ -19,8 +19,9 @@ def add_setting_arguments(parser):
         text = keywords["description"].replace("%", "%%")
         default = keywords["default"]
         shown = _shown(default)
-        if name in properties.PRESET_VALUES["PAPER"]:
-            shown += f"; {_shown(properties.PRESET_VALUES['PAPER'][name])} with --preset paper"
+        for preset in ("PAPER", "LIGHTMAP"):
+            if name in properties.PRESET_VALUES[preset]:
+                shown += f"; {_shown(properties.PRESET_VALUES[preset][name])} with --preset {preset.lower()}"
         extra = {"dest": "setting_" + name, "default": None, "help": f"{text} (default: {shown})"}
         if isinstance(default, bool):
             group.add_argument(option, action=argparse.BooleanOptionalAction, **extra)

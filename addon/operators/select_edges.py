@@ -1,12 +1,12 @@
 """The operator `mesh.ble_unwrap_select_edges`: shows where the edges are that a warning is about."""
 
-import bmesh
 import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
 from .. import last_result
 from ..mesh_arrays import crowded_edges, opposed_edges, read_array
+from .edit_selection import leave_edit_mode, select_elements
 
 EDGES = {"CROWDED": crowded_edges, "OPPOSED": opposed_edges}
 
@@ -43,26 +43,14 @@ class MESH_OT_ble_unwrap_select_edges(bpy.types.Operator):
         return True
 
     def execute(self, context):
-        if context.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode="OBJECT")
+        leave_edit_mode(context)
         visible = [obj for obj in last_result.objects(context) if obj.type == "MESH" and obj.visible_get()]
         found = {obj: shown for obj in visible if (shown := visible_edges(obj.data, EDGES[self.kind])).size}
         if not found:
             which = {"CROWDED": "has more than two faces", "OPPOSED": "lies between opposed faces"}[self.kind]
             self.report({"WARNING"}, f"No visible edge of these meshes {which}")
             return {"CANCELLED"}
-        for obj in context.view_layer.objects:
-            obj.select_set(obj in found)
-        context.view_layer.objects.active = next(iter(found))
-        bpy.ops.object.mode_set(mode="EDIT")
-        bpy.ops.mesh.select_mode(type="EDGE")
-        bpy.ops.mesh.select_all(action="DESELECT")
-        for obj, edges in found.items():
-            edit_mesh = bmesh.from_edit_mesh(obj.data)
-            edit_mesh.edges.ensure_lookup_table()
-            for index in edges:
-                edit_mesh.edges[index].select_set(True)
-            bmesh.update_edit_mesh(obj.data, loop_triangles=False, destructive=False)
+        select_elements(context, found, "EDGE")
         count = sum(map(len, found.values()))
         self.report({"INFO"}, f"{count:,} edge{'' if count == 1 else 's'} selected")
         return {"FINISHED"}

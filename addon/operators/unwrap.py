@@ -158,7 +158,14 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
         outcomes = run.write(results, measure_again=preferences.preference(context, "measure_again"))
         if self.from_sidebar:
             properties.copy_changed(self.properties, context.scene.ble_unwrap)
-        last_result.show(context, titles(outcomes), certificate_lines(outcomes), run.maps(outcomes))
+        last_result.show(
+            context,
+            titles(outcomes),
+            certificate_lines(outcomes),
+            run.maps(outcomes),
+            narrow=run.narrow_faces(outcomes),
+            narrow_charts=sum(len(outcome.report.get("narrow_charts", ())) for outcome in outcomes),
+        )
         for outcome in outcomes:
             for text in outcome.certificate.warnings:
                 self.report({"WARNING"}, text)

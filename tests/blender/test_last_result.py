@@ -30,7 +30,8 @@ def test_a_preset_chosen_in_the_redo_panel_shows_what_will_run(addon):
     properties = addon("properties")
     operator = bpy.context.window_manager.operator_properties_last("uv.ble_unwrap")
     operator.margin = 9
-    for preset, solver in (("PAPER", "LINE_SEARCH"), ("DEFAULT", "NEWTON"), ("ISO_CHARTS", "LINE_SEARCH")):
+    solvers = {"PAPER": "LINE_SEARCH", "LIGHTMAP": "NEWTON", "DEFAULT": "NEWTON", "ISO_CHARTS": "LINE_SEARCH"}
+    for preset, solver in solvers.items():
         operator.preset = preset
         runs = {**properties.default_values(preset), **properties.values(operator)}
         shown = {name: getattr(operator, name) for name in properties.annotations()}

@@ -41,7 +41,7 @@ def test_every_setting_has_a_tooltip(addon):
         assert len(text) > 10 and not text.endswith("."), name
 
 
-@pytest.mark.parametrize("preset", ["DEFAULT", "PAPER", "ISO_CHARTS"])
+@pytest.mark.parametrize("preset", ["DEFAULT", "PAPER", "ISO_CHARTS", "LIGHTMAP"])
 def test_presets_are_those_of_the_native_module(addon, preset):
     properties, engine = addon("properties"), addon("engine")
     settings = bpy.context.scene.ble_unwrap

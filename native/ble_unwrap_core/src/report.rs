@@ -53,6 +53,9 @@ pub struct Report {
     /// Least distance between two charts in texels. A distance above eight texels and above twice the margin is given as
     /// the larger of these two values.
     pub gap_texels: f64,
+    /// The distance between two charts, in texels, that was to be kept: the margin, or what the mip levels take where
+    /// that is more; less where it was too large for the texture and allowed to shrink.
+    pub margin_texels: f64,
     /// Name and duration in seconds of each stage, in order. They are for information only: no result depends on time.
     pub seconds: Vec<(&'static str, f64)>,
     /// How many charts were made by each method of flattening: pairs of the method's name and the number of charts. Where
@@ -65,6 +68,12 @@ pub struct Report {
     pub atlas_limit: Option<f64>,
     /// Charts whose L2 stretch is above `chart_limit`: number and L2 stretch of each, in ascending order of the numbers.
     pub charts_over_limit: Vec<(usize, f64)>,
+    /// Number of charts whose sides lie on the edges of texels, with
+    /// [`PackSettings::snap`](crate::settings::PackSettings::snap).
+    pub snapped_charts: usize,
+    /// Charts that fit between two parallel lines less than two texels apart: their numbers, ascending. A texture can
+    /// show little of what is on them.
+    pub narrow_charts: Vec<usize>,
     /// What else the user should know, in whole sentences.
     pub warnings: Vec<String>,
 }

@@ -24,6 +24,8 @@ use crate::unwrap::{MeshArrays, Wishes, to_python};
 ///     Whether vertices at the same position count as one.
 /// weld_distance : float or None
 ///     How near to each other such vertices are.
+/// cut_angle : float or None
+///     The angle, in degrees, from which on edges are cut.
 #[pyclass(frozen, module = "ble_unwrap_native")]
 pub(crate) struct Analysis {
     shared: Arc<ble_unwrap_core::Analysis>,
@@ -41,8 +43,13 @@ impl Analysis {
         self.shared.weld_distance()
     }
 
-    /// Unwrap the mesh: the function ``unwrap`` with its settings, of which ``weld`` and ``weld_distance`` can only be as in
-    /// ``analyse``.
+    #[getter]
+    fn cut_angle(&self) -> Option<f64> {
+        self.shared.cut_angle()
+    }
+
+    /// Unwrap the mesh: the function ``unwrap`` with its settings, of which ``weld``, ``weld_distance`` and
+    /// ``cut_angle`` can only be as in ``analyse``, also where a preset has them.
     ///
     /// Parameters
     /// ----------
@@ -93,6 +100,10 @@ impl Analysis {
         if !is_given("weld_distance")? {
             call.settings.weld_distance = self.weld_distance();
         }
+        // A preset that cuts says so as much as one who gives the angle.
+        if !is_given("cut_angle")? && call.settings.cut_angle.is_none() {
+            call.settings.cut_angle = self.cut_angle();
+        }
         let job = Job::given_or_new(py, job)?;
         let shared = Arc::clone(&self.shared);
         let work = move |progress: &_| shared.unwrap(&call.settings, progress).map_err(Failure::from);
@@ -117,6 +128,10 @@ impl Analysis {
 ///     Whether vertices at the same position count as one.
 /// weld_distance : float, at least 0, or None
 ///     How near to each other such vertices are, as in ``unwrap``.
+/// cut_angle : float above 0, or None
+///     The angle between the normals of two faces, in degrees, from which on the edge between them is cut.
+/// preset : {"default", "paper", "iso_charts", "lightmap"}
+///     Gives the values of those of these settings that are not named.
 /// threads : int
 ///     Threads to work with; 0 for as many as the machine has.
 ///

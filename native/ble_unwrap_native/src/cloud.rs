@@ -76,7 +76,7 @@ fn to_python(py: Python<'_>, atlas: core::PointAtlas) -> PyResult<Py<PyAny>> {
 /// coarse : bool
 ///     Whether large pieces are cut into charts by cells of some tens of points, which is many times faster.
 /// seed, landmark_fraction, landmark_min, landmark_max, model, kernel_width, relaxation, max_sweeps, tolerance, update,
-/// initial, margin, texture_size, rotation, threads
+/// initial, margin, mip_levels, texture_size, rotation, threads
 ///     As for ``unwrap``. Landmarks are counted by points, or by cells in large pieces.
 ///
 /// Returns

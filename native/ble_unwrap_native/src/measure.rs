@@ -37,6 +37,8 @@ use crate::unwrap::{MeshArrays, Wishes};
 ///     Number of tiles, each of that size, that charts may lie in; ``packing_efficiency`` is over those in which some do.
 /// margin : float
 ///     Distance of charts, in texels, at least up to half of which gaps are searched for.
+/// mip_levels : int
+///     Mip levels that raise the margin, as in ``unwrap``.
 /// threads : int
 ///     Threads to work with; 0 for as many as the machine has. The result does not depend on it.
 ///

@@ -67,6 +67,8 @@ impl PackedCharts {
 ///     A new ``Job``, by which another thread watches or cancels this call.
 /// margin : float
 ///     Least distance between charts, in texels; half of it is kept to the border.
+/// mip_levels : int On how many mip levels, besides the texture itself, filtering mixes no two charts, 0 to 8: the
+/// margin is raised to what that takes, as in ``unwrap``.
 /// texture_size : int or two ints
 ///     Width and height of the texture in texels. Charts keep their shape in texels.
 /// rotation : {"aligned", "any", "quarter", "none"}
@@ -79,6 +81,10 @@ impl PackedCharts {
 /// texel_density : float or None
 ///     Texels to a unit of length of ``points``, for all charts larger than a texel, in as few tiles as are found to do; where it does not fit into
 ///     ``tiles`` tiles, they get the greatest density that is found, and ``warnings`` says so. None for the greatest that is found.
+/// snap : bool Whether charts, or groups, whose outer border is a rectangle along the axes of the texture are laid on
+/// whole texels, which scales each of them by less than a texel along each axis, also at a fixed scale. shrink_margin :
+/// bool Whether a margin that leaves no room for the charts is halved until it does, which ``warnings`` says.
+/// ``border_margin``, if given, is kept.
 /// threads : int
 ///     Threads to work with; 0 for as many as the machine has. The result does not depend on it.
 ///

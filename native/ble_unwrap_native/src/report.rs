@@ -29,11 +29,14 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'
         tiles,
         texels_per_unit,
         gap_texels,
+        margin_texels,
         seconds,
         rungs,
         chart_limit,
         atlas_limit,
         charts_over_limit,
+        snapped_charts,
+        narrow_charts,
         warnings,
         ..
     } = report;
@@ -59,11 +62,14 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'
     dict.set_item("tiles", tiles)?;
     dict.set_item("texels_per_unit", texels_per_unit)?;
     dict.set_item("gap_texels", gap_texels)?;
+    dict.set_item("margin_texels", margin_texels)?;
     dict.set_item("seconds", sums(py, seconds)?)?;
     dict.set_item("rungs", sums(py, rungs)?)?;
     dict.set_item("chart_limit", chart_limit)?;
     dict.set_item("atlas_limit", atlas_limit)?;
     dict.set_item("charts_over_limit", charts_over_limit)?;
+    dict.set_item("snapped_charts", snapped_charts)?;
+    dict.set_item("narrow_charts", narrow_charts)?;
     dict.set_item("warnings", warnings)?;
     Ok(dict)
 }

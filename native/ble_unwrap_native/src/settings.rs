@@ -54,9 +54,9 @@ fn taken_by(function: Function) -> impl Iterator<Item = &'static Setting> {
 ///
 /// Parameters
 /// ----------
-/// preset : {"default", "paper", "iso_charts"}
+/// preset : {"default", "paper", "iso_charts", "lightmap"}
 ///     ``"default"`` is for use; ``"paper"`` is the published method as printed; ``"iso_charts"`` the same with Isomap, which
-///     the paper compares itself with.
+///     the paper compares itself with; ``"lightmap"`` is for textures of baked light.
 ///
 /// Returns
 /// -------

@@ -173,7 +173,9 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 ///     others) and ``stacks`` (such places), ``faces``, ``unmapped_faces``, ``l2``, ``l2_chart_scale``,
 ///     ``l2_worst_chart``, ``l_infinity``, ``angle_distortion``, ``area_distortion``, ``flips``, ``bent_quads``,
 ///     ``overlaps``, ``seam_length``, ``packing_efficiency``, ``tiles``, ``texels_per_unit``, ``gap_texels``,
-///     ``chart_limit``, ``atlas_limit``, ``charts_over_limit``, ``rungs``, ``seconds``, ``warnings`` and more.
+///     ``margin_texels`` (what was to be kept), ``chart_limit``, ``atlas_limit``, ``charts_over_limit``,
+///     ``snapped_charts`` (how many), ``narrow_charts`` (numbers of those narrower than two texels), ``rungs``,
+///     ``seconds``, ``warnings`` and more.
 ///
 /// Raises
 /// ------
@@ -200,6 +202,11 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 /// With several ``tiles``, charts are spread over them at one density, and each lies within one: tile k, from 0, is the square of UV with its lower left
 /// corner at (k mod 10, k // 10). A ``texel_density`` is that of all charts larger than a texel, times a factor of each where ``chart_scale`` is
 /// "stretch"; where it does not fit, a warning says what did.
+///
+/// With ``mip_levels``, no texel of these levels and of the texture is read for two charts by bilinear filtering: for n
+/// levels the margin is 2√2 · 2**n texels at least, or a little more where the size of the texture is no multiple of
+/// 2**n. With ``snap``, sides of rectangles are whole numbers of texels, to single precision; a rectangle that the
+/// limit would not allow it for, or of less than a texel, keeps its shape.
 ///
 /// ``limit_over="atlas"`` bounds the root of the area-weighted mean of the charts' squared L2 stretch, as in UVAtlas.
 ///

@@ -52,6 +52,8 @@ pub(super) fn lay_out(
     settings: &PackSettings,
     progress: &Progress,
 ) -> Result<Layout, CloudError> {
+    // The part of the texture that is packed is smaller, and would have other mip levels.
+    let settings = &PackSettings { snap: false, ..settings.with_whole_margin() };
     let [width, height] = [settings.width, settings.height].map(f64::from);
     let total: f64 = charts.iter().map(|c| c.area).sum();
     let extents: Vec<f64> = charts.par_iter().map(PlaneChart::extent).collect();

@@ -12,7 +12,7 @@ use crate::stretch;
 const MOST_P99_STRETCH: f64 = 4.0;
 
 /// Height (the whole surface has area 1) up to which a face's lengths are rounding.
-pub(super) const NEGLIGIBLE: f64 = 1e-8;
+pub(crate) const NEGLIGIBLE: f64 = 1e-8;
 
 /// A position in the plane for each vertex.
 pub(crate) type Positions = Vec<Point2<f64>>;

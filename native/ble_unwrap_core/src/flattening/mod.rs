@@ -10,7 +10,7 @@ mod rungs;
 mod steps;
 mod strip;
 
-pub(crate) use flat::{Positions, l2};
+pub(crate) use flat::{NEGLIGIBLE, Positions, l2};
 pub(crate) use ladder::{
     Flattened, Polished, flatten, flatten_apart, isometric, lying, opened, part_of_chart, polish, projected, sewn,
 };

@@ -1,6 +1,7 @@
 //! Charts to atlas: scale, pack, round, check, and mend what the checks find.
 
 mod mend;
+mod narrow;
 mod placed;
 mod quads;
 mod scale;
@@ -44,15 +45,18 @@ pub(crate) fn lay_out(
     run: &Run<'_>,
 ) -> Result<Atlas, UnwrapError> {
     let arrays = LayoutArrays::new(input, surface);
-    let texture = Texture::of(&settings.packing);
-    let mut packing = settings.packing.clone();
+    let mut texture = Texture::of(&settings.packing);
+    let mut packing = settings.packing.with_whole_margin();
     let mut round = 0;
     let mut alone = BTreeSet::new();
     loop {
         run.progress.enter(Stage::Pack);
         scale::scale(&mut charts, settings);
         let stacks = Stacks::of(&charts, originals, &alone, settings, run.progress)?;
-        let layout = Placed::new(input, surface, &charts, &stacks, &packing, run.progress)?;
+        let limit = settings.chart_limit();
+        let layout = Placed::new(input, surface, &charts, &stacks, &packing, limit, run.progress)?;
+        // Where the margin may shrink, less is kept than was asked for, and that is proven.
+        texture.margin = texture.margin.min(layout.margin);
         clock.lap("pack");
         round += 1;
         if !layout.unstackable.is_empty() && round < MOST_ROUNDS {
@@ -67,7 +71,7 @@ pub(crate) fn lay_out(
                 drop(charts);
                 let measures = metrics::measure(&mesh, run.progress)?;
                 clock.lap("verify");
-                let mut report = summary::report_of(input, surface, &layout, &measures, settings);
+                let mut report = summary::report_of(input, surface, &layout, &measures, settings, run.progress)?;
                 report.rungs = rungs.taken();
                 report.seconds = clock.into_laps();
                 let atlas = Atlas::proven(layout.uv, layout.polygon_chart, layout.stack, report, certificate)?;

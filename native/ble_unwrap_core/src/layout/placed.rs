@@ -6,15 +6,18 @@ use nalgebra::Point2;
 
 use crate::charts::Chart;
 use crate::error::UnwrapError;
+use crate::flattening::NEGLIGIBLE;
 use crate::mesh::{FaceId, MeshInput, Surface, VertexId};
 use crate::packing::{self, PackItem, PackSettings, Packed, Shortfall};
 use crate::progress::Progress;
 use crate::rounding::{self, Rounding, RoundingError};
+use crate::stretch;
 
 use super::quads;
 use super::stacks::Stacks;
 
 /// Charts packed and rounded.
+#[derive(Default)]
 pub(super) struct Placed {
     pub(super) uv: Vec<[f32; 2]>,
     pub(super) face_chart: Vec<i32>,
@@ -28,6 +31,10 @@ pub(super) struct Placed {
     pub(super) specks: usize,
     pub(super) texels_per_unit: f64,
     pub(super) shortfall: Option<Shortfall>,
+    /// The margin that was kept, in texels.
+    pub(super) margin: f64,
+    /// Number of charts laid on whole texels.
+    pub(super) snapped: usize,
 }
 
 impl Placed {
@@ -37,11 +44,12 @@ impl Placed {
         charts: &[Chart],
         stacks: &Stacks,
         packing: &PackSettings,
+        limit: f64,
         progress: &Progress,
     ) -> Result<Self, UnwrapError> {
         let own_place: Vec<usize> = (0..charts.len()).filter(|&number| stacks.lying[number].is_none()).collect();
         let alone: Vec<&Chart> = own_place.iter().map(|&number| &charts[number]).collect();
-        let packed = pack(&alone, surface.scale, packing, progress)?;
+        let mut packed = pack(&alone, surface.scale, packing, progress)?;
         let size = packed.size.map(f64::from);
         let mut layout = Self {
             uv: vec![[0.0; 2]; input.corner_vertices.len()],
@@ -53,15 +61,22 @@ impl Placed {
             specks: packed.specks,
             texels_per_unit: packed.texels_per_unit,
             shortfall: packed.shortfall,
+            margin: packed.margin,
+            snapped: 0,
         };
         // What others lie on.
         let mut rounded: Vec<Option<Vec<[f32; 2]>>> = vec![None; charts.len()];
-        for (item, (&number, tile)) in own_place.iter().zip(&packed.tiles).enumerate() {
+        for (item, &number) in own_place.iter().enumerate() {
             progress.check()?;
             let chart = &charts[number];
-            let exact: Vec<Point2<f64>> = chart.uv.iter().map(|p| packed.uv(item, *p)).collect();
+            let mut exact = packed.uvs(item, &chart.uv);
+            if packed.is_snapped(item) && exceeds(chart, &exact, size, limit) {
+                packed.unsnap(item);
+                exact = packed.uvs(item, &chart.uv);
+            }
+            layout.snapped += usize::from(packed.is_snapped(item));
             let texel = size.map(|s| 1.0 / s);
-            let rounding = Rounding { texel, corner: tile.corner(), diagonal: surface.diagonal };
+            let rounding = Rounding { texel, corner: packed.tiles[item].corner(), diagonal: surface.diagonal };
             let halves = quads::convex_halves(chart);
             let uv = match rounding::round_to_f32(&chart.patch.mesh, &halves, &exact, &rounding, progress) {
                 Ok(rounded) => rounded.uv,
@@ -113,6 +128,15 @@ impl Placed {
     }
 }
 
+/// Whether a chart that keeps the stretch limit as it was flattened exceeds it as it lies in a texture of the given
+/// size.
+fn exceeds(chart: &Chart, uv: &[Point2<f64>], size: [f64; 2], limit: f64) -> bool {
+    let texels: Vec<Point2<f64>> = uv.iter().map(|p| Point2::new(p.x * size[0], p.y * size[1])).collect();
+    let l2 = stretch::l2_of_positions(&chart.patch.mesh, &texels, NEGLIGIBLE);
+    // What rounding to single precision adds is far below a millionth.
+    chart.l2 <= limit && l2 > limit * (1.0 - 1e-6)
+}
+
 /// Packs charts whose unit is `unit` units of the input, in which densities are given and told.
 fn pack(charts: &[&Chart], unit: f64, packing: &PackSettings, progress: &Progress) -> Result<Packed, UnwrapError> {
     let index = |v: VertexId| u32::try_from(v.index()).unwrap_or(u32::MAX);
@@ -123,8 +147,10 @@ fn pack(charts: &[&Chart], unit: f64, packing: &PackSettings, progress: &Progres
     // A surface has unit area, so that what is out of range here fits into no texture, or is specks in any.
     let in_unit = |density: f64| (density * unit).clamp(f64::MIN_POSITIVE, PackSettings::GREATEST_DENSITY);
     let scaled = PackSettings { texel_density: packing.texel_density.map(in_unit), ..packing.clone() };
-    let packed = packing::pack(&items, &scaled, progress)?;
+    let mut packed = packing::pack(&items, &scaled, progress)?;
     let told =
         |s: Shortfall| Shortfall { wanted: packing.texel_density.unwrap_or(s.wanted), reached: s.reached / unit, ..s };
-    Ok(Packed { texels_per_unit: packed.texels_per_unit / unit, shortfall: packed.shortfall.map(told), ..packed })
+    packed.texels_per_unit /= unit;
+    packed.shortfall = packed.shortfall.map(told);
+    Ok(packed)
 }

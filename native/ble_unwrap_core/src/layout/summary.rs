@@ -2,10 +2,12 @@
 
 use crate::mesh::{MeshInput, Surface, measure};
 use crate::metrics::{self, Measures};
-use crate::packing::Shortfall;
+use crate::packing::{self, Shortfall};
+use crate::progress::{Cancelled, Progress};
 use crate::report::{Report, counted};
 use crate::settings::{LimitOver, Settings};
 
+use super::narrow::Narrow;
 use super::placed::Placed;
 use super::quads;
 
@@ -16,7 +18,8 @@ pub(super) fn report_of(
     layout: &Placed,
     measures: &Measures,
     settings: &Settings,
-) -> Report {
+    progress: &Progress,
+) -> Result<Report, Cancelled> {
     let mut report = Report::new(measures, settings.chart_limit());
     report.faces = input.face_offsets.len().saturating_sub(1);
     report.stacked = layout.stack.iter().filter(|&&stack| stack >= 0).count();
@@ -46,7 +49,13 @@ pub(super) fn report_of(
             report.warnings.push(format!("the atlas has a stretch of {l2:.3}, above the limit of {limit}"));
         }
     }
-    report
+    let narrow = Narrow::of(input, layout, &settings.packing, progress)?;
+    report.warnings.extend(narrow.warning());
+    report.narrow_charts = narrow.charts;
+    report.snapped_charts = layout.snapped;
+    report.margin_texels = settings.packing.margin().min(layout.margin);
+    report.warnings.extend(packing::told_of_margin(settings.packing.margin(), layout.margin));
+    Ok(report)
 }
 
 fn warnings(surface: &Surface, layout: &Placed) -> Vec<String> {

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
+use super::bent_links;
 use super::collapse::{Collapsed, join_ends};
 use super::defects::Defects;
 use super::frame::Frame;
@@ -11,7 +12,7 @@ use super::glue::{Glued, Sides};
 use super::index::{FaceId, HalfedgeId, VertexId};
 use super::input::{MeshError, MeshInput, Polygons};
 use super::irregular::{count_bow_ties, count_duplicates, count_welded, severed_vertices};
-use super::measure::triangle_area;
+use super::measure::{area_vector, triangle_area};
 use super::orient::{Orientation, orient};
 use super::tri_mesh::TriMesh;
 use super::triangulate::{Triangulation, check_given, triangulate};
@@ -28,11 +29,13 @@ pub(crate) struct ConditionOptions {
     pub weld: bool,
     /// How near to each other such vertices are, as [`Settings::weld_distance`](crate::Settings::weld_distance) says.
     pub weld_distance: Option<f64>,
+    /// The angle between two faces, in degrees, from which on the edge between them is cut; `None` cuts none.
+    pub cut_angle: Option<f64>,
 }
 
 impl Default for ConditionOptions {
     fn default() -> Self {
-        Self { weld: true, weld_distance: None }
+        Self { weld: true, weld_distance: None, cut_angle: None }
     }
 }
 
@@ -172,7 +175,7 @@ pub(crate) fn condition(
 
     let unmapped = (0..polygons.len() as u32).filter(|&p| !mapped[p as usize]).collect();
     let surface = match Collapsed::new(&polygons, &mapped, &representative) {
-        None => surface_of(&polygons, &mapped, &points, &representative, input, defects, progress)?,
+        None => surface_of(&polygons, &mapped, &points, &representative, input, options, defects, progress)?,
         Some(collapsed) => {
             collapsed.edges.iter().for_each(|&edge| defects.edges_of_no_length.found(edge));
             let given = input.corner_triangles;
@@ -186,7 +189,7 @@ pub(crate) fn condition(
             };
             let mapped: Vec<bool> = collapsed.polygon.iter().map(|&p| mapped[p as usize]).collect();
             let polygons = Polygons::new(&input)?;
-            let surface = surface_of(&polygons, &mapped, &points, &representative, &input, defects, progress)?;
+            let surface = surface_of(&polygons, &mapped, &points, &representative, &input, options, defects, progress)?;
             uncollapsed(surface, collapsed)
         }
     };
@@ -209,13 +212,16 @@ fn uncollapsed(mut surface: Surface, collapsed: Collapsed) -> Surface {
 }
 
 /// The surface of polygons none of whose sides are to be collapsed, in the frame's unit, with `defects` and those found.
-/// Of `input`, which holds the same polygons, only triangles, seams, guides and weights of seams are looked at.
+/// Of `input`, which holds the same polygons, only triangles, seams, guides and weights of seams are looked at; of the
+/// options only the angle.
+#[expect(clippy::too_many_arguments, reason = "each is the result of another step before")]
 fn surface_of(
     polygons: &Polygons<'_>,
     mapped: &[bool],
     points: &[Point3<f64>],
     representative: &[u32],
     input: &MeshInput<'_>,
+    options: &ConditionOptions,
     mut defects: Defects,
     progress: &Progress,
 ) -> Result<Surface, MeshError> {
@@ -238,11 +244,18 @@ fn surface_of(
     progress.check()?;
 
     let (areas, total_area) = polygon_areas(polygons, points, &triangulation, &mut defects);
-    let orientation = orient(polygons.len(), links, |corner| polygons.polygon(corner as usize), &areas);
+    let mut orientation = orient(polygons.len(), links, |corner| polygons.polygon(corner as usize), &areas);
     for link in &orientation.contradicting {
         let [a, b] = polygons.side(link.sides[0] as usize);
         defects.contradicting_edges.found([a.min(b) as u32, a.max(b) as u32]);
         severed.extend(link.sides);
+    }
+    if let Some(angle) = options.cut_angle {
+        let normals = normals(polygons, points, &triangulation, &orientation.reversed);
+        let polygon = |side: u32| polygons.polygon(side as usize);
+        for link in bent_links::take(&mut orientation.links, &normals, polygon, angle) {
+            severed.extend(link.sides);
+        }
     }
     for p in (0..polygons.len()).filter(|&p| orientation.reversed[p]) {
         defects.reversed_faces.found(p as u32);
@@ -432,6 +445,21 @@ fn seam_weights(weights: &[f32], representative: &[u32], vertex: &[u32]) -> Vec<
         if count > 1.0 { f64::exp(sum / count) as f32 } else { weights[*v as usize] }
     };
     vertex.iter().map(mean).collect()
+}
+
+/// The normal of each polygon as it is wound in the mesh, times twice its area.
+fn normals(
+    polygons: &Polygons<'_>,
+    points: &[Point3<f64>],
+    triangulation: &Triangulation,
+    reversed: &[bool],
+) -> Vec<Vector3<f64>> {
+    let mut normals = vec![Vector3::zeros(); polygons.len()];
+    for (corners, &p) in triangulation.triangles.iter().zip(&triangulation.polygon) {
+        let normal = area_vector(corners.map(|c| points[polygons.vertex(c as usize)]));
+        normals[p as usize] += if reversed[p as usize] { -normal } else { normal };
+    }
+    normals
 }
 
 /// Area of each polygon and of all, in the frame's unit. Counts the triangles that have none.

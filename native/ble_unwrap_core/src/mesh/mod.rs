@@ -2,6 +2,7 @@
 //!
 //! Knows nothing of charts, UVs or stages.
 
+mod bent_links;
 mod canonical;
 mod coarsen;
 mod collapse;

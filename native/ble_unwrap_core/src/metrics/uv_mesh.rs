@@ -27,8 +27,8 @@ impl Texture {
     /// The texture that charts are packed into.
     #[must_use]
     pub(crate) fn of(packing: &PackSettings) -> Self {
-        let PackSettings { width, height, margin_texels: margin, tiles, .. } = *packing;
-        Self { width, height, margin, tiles: tiles.clamp(1, PackSettings::MOST_TILES) }
+        let PackSettings { width, height, tiles, .. } = *packing;
+        Self { width, height, margin: packing.margin(), tiles: tiles.clamp(1, PackSettings::MOST_TILES) }
     }
 
     /// Factors that turn UV into texels; a side of no texels counts as one.

@@ -28,9 +28,11 @@
 //! 9. `density` is the whole of it for one texture; `alone` a single chart, where there is nothing to search.
 //! 10. `spread`, for several tiles or a density that is given: which chart goes into which tile, each of which is packed by 1 to 9.
 //!     `tile` says where tiles lie, `shortfall` what the user is told of a density that does not fit.
+//! 11. `snap`: at last rectangles are laid on whole texels, where that is asked for.
 //!
 //! `constraints` are what a caller may ask for in addition. `obstacles` are cells that are occupied from the start, by the same raster
-//! and the same distance between cells, so that the guarantee holds for them as it does between charts.
+//! and the same distance between cells, so that the guarantee holds for them as it does between charts. `mip_margin`
+//! says how wide a margin keeps mip levels apart, and `width` how wide a chart is.
 //!
 //! **References.** Lévy, Petitjean, Ray, Maillot: Least squares conformal maps for automatic texture
 //! atlas generation, SIGGRAPH 2002, section 4 (charts of pixels piled up, large ones first); Sander,
@@ -49,6 +51,7 @@ mod goal;
 mod grid;
 mod many;
 mod mask;
+mod mip_margin;
 mod obstacles;
 mod occupancy;
 mod order;
@@ -63,13 +66,16 @@ mod settle;
 mod shape;
 mod shelves;
 mod shortfall;
+mod shrink;
 mod sketch;
+mod snap;
 mod spread;
 #[cfg(test)]
 mod tests;
 mod tile;
 #[cfg(test)]
 mod tiled_tests;
+mod width;
 
 use nalgebra::{Point2, Vector2};
 use rayon::prelude::*;
@@ -82,9 +88,13 @@ use crate::progress::{Cancelled, Progress};
 pub(crate) use constraints::Constraints;
 pub(crate) use outline::LARGEST;
 use outline::Outline;
+use placement::Place;
 pub(crate) use shortfall::Shortfall;
+pub(crate) use shrink::told as told_of_margin;
+use snap::Snapped;
 use spread::Spread;
 pub(crate) use tile::Tile;
+pub(crate) use width::least_width;
 
 /// Which rotations a chart may take. Charts are never mirrored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,6 +160,19 @@ pub struct PackSettings {
     /// one is had in as few tiles as are found to do; where it does not fit into `tiles` tiles, charts get the greatest density that is found, with a
     /// warning. For a point cloud it has no meaning.
     pub texel_density: Option<f64>,
+    /// On how many mip levels, besides the texture itself, filtering is to mix no two charts: 0 to
+    /// [`PackSettings::MOST_MIP_LEVELS`]. The margin is raised to what that takes, which [`PackSettings::margin`]
+    /// tells; 0 leaves it as it is.
+    pub mip_levels: usize,
+    /// Whether charts whose outer border is a rectangle along the axes of the texture are laid on whole texels: their
+    /// sides go to the nearest edges of texels, which scales them by less than a texel along each axis, also where a
+    /// scale or a density is given. All others keep their shape. The room for it is kept besides the margin. For a
+    /// point cloud it has no meaning.
+    pub snap: bool,
+    /// Whether a margin that leaves no room for the charts in the texture is halved until it does, with a warning,
+    /// where it is an error otherwise. A distance to the border that is given besides is kept. For a point cloud it has
+    /// no meaning.
+    pub shrink_margin: bool,
 }
 
 impl PackSettings {
@@ -160,11 +183,20 @@ impl PackSettings {
     /// Greatest texel density that can be asked for: the largest texture upon a surface of 30 millionths of a unit. It is a bound only so that
     /// products with it are finite.
     pub const GREATEST_DENSITY: f64 = 1e9;
+    /// Most mip levels that can be asked for: the margin of 724 texels that they take is about the largest that can be
+    /// asked for.
+    pub const MOST_MIP_LEVELS: usize = 8;
 
     /// The paper's: a margin of two texels at a texture size of 1024, and quarter turns.
     #[must_use]
     pub fn paper() -> Self {
         Self { margin_texels: 2.0, width: 1024, height: 1024, rotation: Rotation::Quarter, ..Self::default() }
+    }
+
+    /// For lightmaps: two mip levels of a texture of 1024 texels, and rectangles on whole texels.
+    #[must_use]
+    pub fn lightmap() -> Self {
+        Self { width: 1024, height: 1024, mip_levels: 2, snap: true, ..Self::default() }
     }
 
     fn check(&self) -> Result<(), PackError> {
@@ -196,6 +228,9 @@ impl Default for PackSettings {
             quality: Quality::Fast,
             tiles: 1,
             texel_density: None,
+            mip_levels: 0,
+            snap: false,
+            shrink_margin: false,
         }
     }
 }
@@ -258,16 +293,39 @@ pub(crate) struct Packed {
     pub specks: usize,
     /// Width and height of a tile.
     pub size: [u32; 2],
+    /// The margin that is kept, in texels: less than what was asked for only with [`PackSettings::shrink_margin`].
+    pub margin: f64,
+    /// For each item what lays it on whole texels after its pose, if anything does; empty where nothing was to be.
+    snapped: Vec<Option<Snapped>>,
 }
 
 impl Packed {
-    /// Where a point of an item's plane goes, in UV.
-    #[inline]
+    /// Where the points of an item go, in UV: all of them, in their order.
     #[must_use]
-    pub(crate) fn uv(&self, item: usize, p: Point2<f64>) -> Point2<f64> {
-        let texel = self.poses[item].texel(p);
+    pub(crate) fn uvs(&self, item: usize, points: &[Point2<f64>]) -> Vec<Point2<f64>> {
+        let mut at: Vec<Point2<f64>> = points.iter().map(|p| self.poses[item].texel(*p)).collect();
+        if let Some(Some(snapped)) = self.snapped.get(item) {
+            snapped.apply(&mut at);
+        }
         let corner = self.tiles[item].corner();
-        Point2::new(texel.x / f64::from(self.size[0]) + corner[0], texel.y / f64::from(self.size[1]) + corner[1])
+        for p in &mut at {
+            p.x = p.x / f64::from(self.size[0]) + corner[0];
+            p.y = p.y / f64::from(self.size[1]) + corner[1];
+        }
+        at
+    }
+
+    /// Whether an item is laid on whole texels.
+    #[must_use]
+    pub(crate) fn is_snapped(&self, item: usize) -> bool {
+        matches!(self.snapped.get(item), Some(Some(_)))
+    }
+
+    /// Gives an item its shape back: it is not laid on whole texels then. There is room for it either way.
+    pub(crate) fn unsnap(&mut self, item: usize) {
+        if let Some(snapped) = self.snapped.get_mut(item) {
+            *snapped = None;
+        }
     }
 }
 
@@ -460,7 +518,8 @@ pub(crate) fn pack(items: &[PackItem<'_>], settings: &PackSettings, progress: &P
 /// The same within further constraints: another distance to the border of the texture, a scale that is given, and obstacles.
 ///
 /// Guaranteed in addition: every chart is at least the margin from every obstacle, and with a given scale each has exactly that,
-/// specks included. `efficiency` counts the obstacles, too: the sum of their areas within the texture, but no more than the
+/// specks included, but for what [`PackSettings::snap`] changes. `efficiency` counts the obstacles, too: the sum of
+/// their areas within the texture, but no more than the
 /// cells they touch.
 ///
 /// # Errors
@@ -472,6 +531,28 @@ pub(crate) fn pack_within(
     progress: &Progress,
 ) -> Result<Packed, PackError> {
     settings.check()?;
+    let mut asked = settings.with_whole_margin();
+    loop {
+        match pack_apart(items, constraints, &asked, progress) {
+            Err(error) if asked.shrink_margin && shrink::helps(&error) && asked.margin_texels > 0.0 => {
+                asked.margin_texels = shrink::smaller(asked.margin_texels);
+            }
+            Err(error) if asked.snap => return Err(shrink::with_margin(error, asked.margin_texels)),
+            found => return found,
+        }
+    }
+}
+
+/// The same at the margin of the settings, whatever the mip levels.
+fn pack_apart(
+    items: &[PackItem<'_>],
+    given: &Constraints<'_>,
+    asked: &PackSettings,
+    progress: &Progress,
+) -> Result<Packed, PackError> {
+    given.check(asked)?;
+    let (settings, constraints) = if asked.snap { snap::with_room(asked, given) } else { (asked.clone(), *given) };
+    let (settings, constraints) = (&settings, &constraints);
     constraints.check(settings)?;
     progress.check()?;
     require_memory(items)?;
@@ -496,13 +577,23 @@ pub(crate) fn pack_within(
         is_used[tile.number()] = of_tile > 0.0;
         covered += of_tile;
     }
+    let snapped: Vec<Option<Snapped>> = if settings.snap {
+        let snapped = |((item, outline), place): ((&PackItem<'_>, &Outline), &Option<Place>)| {
+            progress.check()?;
+            Ok(place.as_ref().and_then(|place| Snapped::new(item, outline, &place.pose)))
+        };
+        items.par_iter().zip(&outlines).zip(&dense.places).map(snapped).collect::<Result<_, Cancelled>>()?
+    } else {
+        Vec::new()
+    };
     let mut poses = Vec::with_capacity(items.len());
-    for ((outline, place), tile) in outlines.iter().zip(&dense.places).zip(&tiles) {
+    for (number, ((outline, place), tile)) in outlines.iter().zip(&dense.places).zip(&tiles).enumerate() {
         // Only items without triangles are not placed.
         let nowhere = Pose { cos: 1.0, sin: 0.0, centre: outline.centre, scale: dense.density, offset: middle };
         let pose = place.map_or(nowhere, |p| p.pose);
         let area = outline.area * (outline.extent * pose.scale).powi(2);
-        covered += area.min(place.map_or(0.0, |p| p.touched));
+        let factor = snapped.get(number).and_then(Option::as_ref).map_or(1.0, Snapped::area_factor);
+        covered += factor * area.min(place.map_or(0.0, |p| p.touched));
         is_used[tile.number()] |= place.is_some();
         poses.push(pose);
     }
@@ -510,5 +601,16 @@ pub(crate) fn pack_within(
     let size = [settings.width, settings.height];
     let tiles_used = is_used.iter().filter(|used| **used).count();
     let efficiency = covered / (texels * tiles_used.max(1) as f64);
-    Ok(Packed { poses, tiles, tiles_used, efficiency, texels_per_unit: dense.density, shortfall, specks, size })
+    Ok(Packed {
+        poses,
+        tiles,
+        tiles_used,
+        efficiency,
+        texels_per_unit: dense.density,
+        shortfall,
+        specks,
+        size,
+        margin: asked.margin_texels,
+        snapped,
+    })
 }

@@ -27,6 +27,8 @@ pub(super) struct Outline {
     pub(super) extent: f64,
     /// Whether the chart is never enlarged, however small it is.
     pub(super) keeps_size: bool,
+    /// The item's number of each vertex; empty where vertices were moved together.
+    pub(super) source: Vec<u32>,
 }
 
 /// A directed edge, its interior to the left, `winding` times.
@@ -65,6 +67,7 @@ impl Outline {
                 centre,
                 extent: 0.0,
                 keeps_size: false,
+                source: Vec::new(),
             });
         }
         let size = high - low;
@@ -86,11 +89,12 @@ impl Outline {
         }
         half.sort_unstable();
         let mut new_index = HashMap::new();
-        let mut points = Vec::new();
+        let (mut points, mut source) = (Vec::new(), Vec::new());
         let mut edges = Vec::new();
         let mut keep = |v: u32| {
             *new_index.entry(v).or_insert_with(|| {
                 points.push(Point2::from((item.points[v as usize] - centre) / unit));
+                source.push(v);
                 points.len() as u32 - 1
             })
         };
@@ -102,7 +106,7 @@ impl Outline {
                 edges.push(Edge { from, to, winding: winding.abs() });
             }
         }
-        Ok(Self { points, edges, area, centre, extent, keeps_size: false })
+        Ok(Self { points, edges, area, centre, extent, keeps_size: false, source })
     }
 
     /// The outline with its vertices moved together on a lattice of `step` units, which leaves far fewer
@@ -138,7 +142,7 @@ impl Outline {
                 edges.push(Edge { from, to, winding: winding.abs() });
             }
         }
-        Self { points, edges, ..*self }
+        Self { points, edges, source: Vec::new(), ..*self }
     }
 
     /// What one unit of `points` is in the chart plane.

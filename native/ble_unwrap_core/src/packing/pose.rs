@@ -201,7 +201,7 @@ fn flat_turn(outline: &Outline) -> [f64; 2] {
 }
 
 /// Convex hull, counter-clockwise, without collinear points (Andrew's monotone chain).
-fn convex_hull(points: &[Point2<f64>]) -> Vec<Point2<f64>> {
+pub(super) fn convex_hull(points: &[Point2<f64>]) -> Vec<Point2<f64>> {
     let mut sorted = points.to_vec();
     sorted.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     sorted.dedup();

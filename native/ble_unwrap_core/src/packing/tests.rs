@@ -117,9 +117,11 @@ pub(super) fn square(size: u32, margin_texels: f64) -> PackSettings {
 /// All triangles of a chart in texels, after rounding UVs to f32.
 pub(super) fn final_triangles(packed: &Packed, item: usize, chart: &Chart) -> Vec<[Point2<f64>; 3]> {
     let [w, h] = packed.size.map(f64::from);
+    let uv = packed.uvs(item, &chart.0);
+    let corner = packed.tiles[item].corner();
     let at = |v: u32| {
-        let texel = packed.poses[item].texel(chart.0[v as usize]);
-        Point2::new(f64::from((texel.x / w) as f32) * w, f64::from((texel.y / h) as f32) * h)
+        let [x, y] = [0, 1].map(|k| f64::from(uv[v as usize][k] as f32) - corner[k]);
+        Point2::new(x * w, y * h)
     };
     chart.1.iter().map(|t| t.map(at)).collect()
 }

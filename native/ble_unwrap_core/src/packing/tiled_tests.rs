@@ -42,7 +42,7 @@ fn by_tile(charts: &[Chart], packed: &Packed) -> Vec<(Tile, Vec<Placed>)> {
             let triangles = of_tile.map(|k| {
                 let (points, triangles) = &charts[k];
                 let at = |v: u32| {
-                    let uv = packed.uv(k, points[v as usize]);
+                    let uv = packed.uvs(k, &[points[v as usize]])[0];
                     let local = |axis: usize| (f64::from(uv[axis] as f32) - corner[axis]) * size[axis];
                     Point2::new(local(0), local(1))
                 };
@@ -304,7 +304,7 @@ fn charts_of_neighbouring_tiles_keep_the_margin_without_one_to_the_border() {
     let settings = PackSettings { rotation: Rotation::Any, ..tiled(256, 8.0, 2) };
     let constraints = Constraints { border_texels: Some(0.0), ..Constraints::default() };
     let packed = pack_within(&items(&charts), &constraints, &settings, &Progress::new()).expect("two squares");
-    let reach = |k: usize| charts[k].0.iter().map(|p| 256.0 * packed.uv(k, *p)[0]).collect::<Vec<f64>>();
+    let reach = |k: usize| charts[k].0.iter().map(|p| 256.0 * packed.uvs(k, &[*p])[0][0]).collect::<Vec<f64>>();
     let [first, second] = if packed.tiles[0] < packed.tiles[1] { [0, 1] } else { [1, 0] };
     let right = reach(first).into_iter().fold(f64::MIN, f64::max);
     let left = reach(second).into_iter().fold(f64::MAX, f64::min);

@@ -32,6 +32,10 @@ pub(crate) const MOST_TOGETHER: usize = 20_000;
 /// The default of [`Settings::stretch_price`].
 const DEFAULT_STRETCH_PRICE: f64 = 20.0;
 
+/// The angle between two faces, in degrees, from which on a lightmap is cut between them: the sides of a hexagonal nut
+/// are 60° apart and shaded one by one; those of an octagonal tube are 45° apart and shaded as if they were round.
+const LIGHT_JUMPS: f64 = 50.0;
+
 /// What happens to the holes of a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -203,12 +207,15 @@ pub enum Preset {
     Paper,
     /// [`Settings::iso_charts`].
     IsoCharts,
+    /// [`Settings::lightmap`].
+    Lightmap,
 }
 
 choices!(Preset {
     Default: "default", "Default", "Extended model, fast solvers: least stretch and fewest charts.";
     Paper: "paper", "Paper", "The published method as printed: slower, more charts.";
     IsoCharts: "iso_charts", "Iso-charts", "The same with Isomap, the method the paper compares itself with.";
+    Lightmap: "lightmap", "Lightmap", "For baked light: hard edges are cut, mip levels do not bleed, and rectangles lie on whole texels.";
 });
 
 /// A limit over the atlas lets single charts stretch so many times more above 1.
@@ -234,6 +241,10 @@ pub struct Settings {
     /// become a single vertex. Two vertices of one polygon are never welded unless they coincide: welding takes no side
     /// from a polygon, however large the distance.
     pub weld_distance: Option<f64>,
+    /// The angle between the normals of two faces, in degrees, from which on the edge between them is cut, above 0 and
+    /// at most 180; `None` cuts none for its angle. Angles that differ by rounding, up to a millionth of the cosine,
+    /// count as the same. Faces without area have no normal, and are not cut off for it.
+    pub cut_angle: Option<f64>,
     /// Whether large components are first cut on a coarse copy of the mesh. When it is off, as in the paper's presets,
     /// trial embeddings also use the full number of landmarks.
     pub coarse: bool,
@@ -298,6 +309,7 @@ impl Default for Settings {
             limit_over: LimitOver::Chart,
             weld: false,
             weld_distance: None,
+            cut_angle: None,
             coarse: true,
             moves: Moves::All,
             stretch_price: DEFAULT_STRETCH_PRICE,
@@ -355,13 +367,22 @@ impl Settings {
         let paper = Self::paper();
         Self { embedding: EmbeddingSettings { model: Model::Isomap, ..paper.embedding.clone() }, ..paper }
     }
+
+    /// For textures of baked light. Edges of 50° and more are cut, since light jumps there and filtering would smear
+    /// the jump across the edge; a texture of 1024 texels keeps charts apart also on two mip levels, down to 256
+    /// texels; and rectangles lie on whole texels. The rest is as by default: no two charts share a place, and there is
+    /// one tile.
+    #[must_use]
+    pub fn lightmap() -> Self {
+        Self { cut_angle: Some(LIGHT_JUMPS), packing: PackSettings::lightmap(), ..Self::default() }
+    }
 }
 
 impl Settings {
     /// What a mesh is conditioned with.
     #[must_use]
     pub(crate) fn conditioning(&self) -> ConditionOptions {
-        ConditionOptions { weld: self.weld, weld_distance: self.weld_distance }
+        ConditionOptions { weld: self.weld, weld_distance: self.weld_distance, cut_angle: self.cut_angle }
     }
 
     /// The L2 stretch that a single chart may have. This is `stretch_limit` itself, or, where the limit is over the atlas,
@@ -381,6 +402,7 @@ impl Settings {
             Preset::Default => Self::default(),
             Preset::Paper => Self::paper(),
             Preset::IsoCharts => Self::iso_charts(),
+            Preset::Lightmap => Self::lightmap(),
         }
     }
 
@@ -428,7 +450,7 @@ mod tests {
 
     #[test]
     fn presets_are_valid_and_iso_charts_differs_from_the_paper_in_its_model_only() {
-        for settings in [Settings::default(), Settings::paper(), Settings::iso_charts()] {
+        for settings in [Settings::default(), Settings::paper(), Settings::iso_charts(), Settings::lightmap()] {
             assert!(settings.validate().is_ok());
         }
         let mut settings = Settings::iso_charts();

@@ -132,6 +132,8 @@ pub enum Group {
     Limit,
     /// Which vertices count as one.
     Weld,
+    /// Which edges of a surface are cut whatever the charts.
+    Cut,
     /// How distances on surfaces are measured.
     Geodesics,
     /// How many landmarks there are.
@@ -151,16 +153,17 @@ pub enum Group {
     Tiles,
     /// How charts are placed in the texture.
     Packing,
-    /// How large charts are. Those of clouds fill the texture.
+    /// How large charts are, to the texel, and what gives way where they do not fit. Those of clouds fill the texture.
     Density,
 }
 
 impl Group {
     /// All groups.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Charts,
         Self::Limit,
         Self::Weld,
+        Self::Cut,
         Self::Geodesics,
         Self::Landmarks,
         Self::Model,
@@ -180,6 +183,7 @@ impl Group {
             Self::Charts => "charts",
             Self::Limit => "limit",
             Self::Weld => "weld",
+            Self::Cut => "cut",
             Self::Geodesics => "geodesics",
             Self::Landmarks => "landmarks",
             Self::Model => "model",
@@ -201,6 +205,7 @@ impl Group {
             Self::Charts => &[],
             Self::Limit => &[UnwrapPoints],
             Self::Weld => &[Analyse, Flatten, Measure],
+            Self::Cut => &[Analyse],
             Self::Geodesics => &[GeodesicDistances, Flatten],
             Self::Landmarks => &[Flatten, UnwrapPoints],
             Self::Model => &[Embed, Place, Flatten, UnwrapPoints],
@@ -387,6 +392,8 @@ pub static TABLE: &[Setting] = &[
     row("weld_distance", "Weld Distance", Group::Weld,
         Kind::OptionalReal(|s| &mut s.weld_distance, Interval::at_least(0.0), "what single precision cannot tell apart"), "the mesh's unit of length",
         "How near to each other vertices are that are welded. Two vertices of one face never are, unless they coincide."),
+    row("cut_angle", "Cut Angle", Group::Cut, Kind::OptionalReal(|s| &mut s.cut_angle, Interval::above(0.0, 180.0), "no edge"), "degrees",
+        "Edges at which the normals of two faces are at least so many degrees apart are all cut."),
     row("coarse", "Coarse First", Group::Limit, Kind::Flag(|s| &mut s.coarse), "",
         "Decides on a coarse copy where to cut large pieces of surface, which is many times faster."),
     row("stretch_price", "Stretch Price", Group::Charts, Kind::Real(|s| &mut s.stretch_price, Interval::closed(0.0, 1e3)), "width of the surface",
@@ -454,6 +461,9 @@ pub static TABLE: &[Setting] = &[
         Kind::Size(|s| [&mut s.packing.width, &mut s.packing.height], [1, PackSettings::LARGEST_SIZE]), "texels",
         "Width and height, in texels, of the texture that the UVs are meant for: its proportions and, for the margin, its \
          resolution."),
+    row("mip_levels", "Mip Levels", Group::Texture, Kind::Whole(|s| &mut s.packing.mip_levels, [0, PackSettings::MOST_MIP_LEVELS]), "levels",
+        "On how many mip levels of the texture, besides itself, bilinear filtering mixes no two charts: the margin is raised to 2.83 texels of the last one. \
+         0 leaves it as it is."),
     row("rotation", "Rotation", Group::Packing, Kind::Choice(|s| &mut s.packing.rotation), "",
         "How charts may be turned when they are packed."),
     row("quality", "Packing Quality", Group::Packing, Kind::Choice(|s| &mut s.packing.quality), "",
@@ -465,4 +475,9 @@ pub static TABLE: &[Setting] = &[
         "texels per unit of length",
         "How many texels a unit of length gets, in all charts that are larger than a texel, in as few tiles as are found to do; where there are too \
          few, charts get the greatest density that is found, with a warning."),
+    row("snap", "Snap to Texels", Group::Density, Kind::Flag(|s| &mut s.packing.snap), "",
+        "Moves the sides of charts that are rectangles to the nearest edges of texels, so that none is covered in part; this scales such a chart by less than a \
+         texel along each axis."),
+    row("shrink_margin", "Shrink Margin", Group::Density, Kind::Flag(|s| &mut s.packing.shrink_margin), "",
+        "Halves a margin that leaves no room for the charts in the texture until it does, with a warning; otherwise such a margin is an error."),
 ];

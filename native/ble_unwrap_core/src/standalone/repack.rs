@@ -20,7 +20,8 @@ pub enum RepackScale {
     /// texel.
     #[default]
     Uniform,
-    /// Charts keep their size. A unit of the points is the width of the texture, along both of its sides.
+    /// Charts keep their size, but for what [`PackSettings::snap`] changes. A unit of the points is the width of the
+    /// texture, along both of its sides.
     Fixed,
 }
 
@@ -172,7 +173,7 @@ pub struct Repacked {
     pub texels_per_unit: f64,
     /// Number of tiny charts or groups, each of which was scaled up to about a texel by a factor of its own.
     pub specks: usize,
-    /// What else the user should know, in sentences: that a [`PackSettings::texel_density`] does not fit.
+    /// What else the user should know, in sentences: that a [`PackSettings::texel_density`] or a margin does not fit.
     pub warnings: Vec<String>,
 }
 
@@ -230,8 +231,7 @@ pub fn repack(
         }
     }
     for (number, island) in islands.iter().enumerate() {
-        for (&from, p) in island.source.iter().zip(&island.points) {
-            let at = packed.uv(number, *p);
+        for (&from, at) in island.source.iter().zip(packed.uvs(number, &island.points)) {
             uv[from] = [at.x as f32, at.y as f32];
         }
     }
@@ -242,7 +242,9 @@ pub fn repack(
         efficiency: packed.efficiency,
         texels_per_unit: packed.texels_per_unit,
         specks: packed.specks,
-        warnings: packed.shortfall.iter().map(Shortfall::to_string).collect(),
+        warnings: (packed.shortfall.iter().map(Shortfall::to_string))
+            .chain(packing::told_of_margin(settings.margin(), packed.margin))
+            .collect(),
     })
 }
 

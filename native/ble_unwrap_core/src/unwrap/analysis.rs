@@ -62,6 +62,12 @@ impl Analysis {
         self.conditioning.weld_distance
     }
 
+    /// The angle between two faces, in degrees, from which on edges are cut; `None` where none is for its angle.
+    #[must_use]
+    pub fn cut_angle(&self) -> Option<f64> {
+        self.conditioning.cut_angle
+    }
+
     /// Number of faces of the mesh.
     #[must_use]
     pub fn face_count(&self) -> usize {
@@ -72,7 +78,7 @@ impl Analysis {
     ///
     /// # Errors
     /// Those of [`unwrap`](crate::unwrap()); also [`UnwrapError::Setting`] if `settings.weld` or, where it is on,
-    /// `settings.weld_distance` is not what the mesh was analysed with.
+    /// `settings.weld_distance`, or `settings.cut_angle` is not what the mesh was analysed with.
     pub fn unwrap(&self, settings: &Settings, progress: &Progress) -> Result<Atlas, UnwrapError> {
         progress.check()?;
         settings.validate()?;
@@ -86,6 +92,12 @@ impl Analysis {
             let value = settings.weld_distance.map_or_else(|| "not given".into(), |d| d.to_string());
             let allowed = "what it was in the analysis".into();
             return Err(UnwrapError::Setting { name: "weld_distance", value, allowed });
+        }
+        if settings.cut_angle != made_with.cut_angle {
+            let text = |angle: Option<f64>| angle.map_or_else(|| "not given".into(), |angle| angle.to_string());
+            let (value, allowed) =
+                (text(settings.cut_angle), format!("{}, as in the analysis", text(made_with.cut_angle)));
+            return Err(UnwrapError::Setting { name: "cut_angle", value, allowed });
         }
         let input = MeshInput {
             positions: &self.positions,
@@ -142,6 +154,8 @@ mod tests {
         };
         assert_eq!(refused(Settings::default()), "weld");
         assert_eq!(refused(Settings { weld: true, ..Settings::default() }), "weld_distance");
+        let as_analysed = Settings { weld: true, weld_distance: Some(0.1), ..Settings::default() };
+        assert_eq!(refused(Settings { cut_angle: Some(30.0), ..as_analysed }), "cut_angle");
         assert_eq!(refused(Settings { weld: true, weld_distance: Some(-1.0), ..Settings::default() }), "weld_distance");
         let negative = Settings { weld: true, weld_distance: Some(f64::NAN), ..Settings::default() };
         let error = with_squares(|input| Analysis::new(input, &negative, &Progress::new())).map(|_| ());

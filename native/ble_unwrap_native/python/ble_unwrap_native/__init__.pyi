@@ -54,8 +54,8 @@ class InternalError(BleUnwrapError): ...
 # made by `make settings`
 @type_check_only
 class _CallSettings(TypedDict, total=False):
-    preset: Literal["default", "paper", "iso_charts"]
-    """The preset that gives the values of all settings that are not named in the call. "default": Extended model, fast solvers: least stretch and fewest charts. "paper": The published method as printed: slower, more charts. "iso_charts": The same with Isomap, the method the paper compares itself with."""
+    preset: Literal["default", "paper", "iso_charts", "lightmap"]
+    """The preset that gives the values of all settings that are not named in the call. "default": Extended model, fast solvers: least stretch and fewest charts. "paper": The published method as printed: slower, more charts. "iso_charts": The same with Isomap, the method the paper compares itself with. "lightmap": For baked light: hard edges are cut, mip levels do not bleed, and rectangles lie on whole texels."""
     threads: int
     """Processor threads to work with; 0 takes all that the machine has. The result does not depend on it."""
 
@@ -99,6 +99,11 @@ class _WeldGroup(TypedDict, total=False):
     """Lets charts run across vertices at the same place, which imported files often have. The mesh itself stays as it is."""
     weld_distance: float | None
     """How near to each other vertices are that are welded. Two vertices of one face never are, unless they coincide. None stands for what single precision cannot tell apart."""
+
+@type_check_only
+class _CutGroup(TypedDict, total=False):
+    cut_angle: float | None
+    """Edges at which the normals of two faces are at least so many degrees apart are all cut. None stands for no edge."""
 
 @type_check_only
 class _GeodesicsGroup(TypedDict, total=False):
@@ -154,6 +159,8 @@ class _TextureGroup(TypedDict, total=False):
     """Least distance between two charts, in texels, the pixels of the texture; half of it is kept to the border."""
     texture_size: int | Sequence[int]
     """Width and height, in texels, of the texture that the UVs are meant for: its proportions and, for the margin, its resolution."""
+    mip_levels: int
+    """On how many mip levels of the texture, besides itself, bilinear filtering mixes no two charts: the margin is raised to 2.83 texels of the last one. 0 leaves it as it is."""
 
 @type_check_only
 class _TilesGroup(TypedDict, total=False):
@@ -171,6 +178,10 @@ class _PackingGroup(TypedDict, total=False):
 class _DensityGroup(TypedDict, total=False):
     texel_density: float | None
     """How many texels a unit of length gets, in all charts that are larger than a texel, in as few tiles as are found to do; where there are too few, charts get the greatest density that is found, with a warning. None stands for the greatest that is found."""
+    snap: bool
+    """Moves the sides of charts that are rectangles to the nearest edges of texels, so that none is covered in part; this scales such a chart by less than a texel along each axis."""
+    shrink_margin: bool
+    """Halves a margin that leaves no room for the charts in the texture until it does, with a warning; otherwise such a margin is an error."""
 
 @type_check_only
 class _UnwrapSettings(
@@ -178,6 +189,7 @@ class _UnwrapSettings(
     _ChartsGroup,
     _LimitGroup,
     _WeldGroup,
+    _CutGroup,
     _GeodesicsGroup,
     _LandmarksGroup,
     _ModelGroup,
@@ -192,7 +204,7 @@ class _UnwrapSettings(
 ): ...
 
 @type_check_only
-class _AnalyseSettings(_CallSettings, _WeldGroup, total=False): ...
+class _AnalyseSettings(_CallSettings, _WeldGroup, _CutGroup, total=False): ...
 
 @type_check_only
 class _UnwrapPointsSettings(

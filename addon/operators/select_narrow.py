@@ -1,0 +1,53 @@
+"""The operator `mesh.ble_unwrap_select_narrow`: shows where the charts are that are too narrow for the texture."""
+
+import bpy
+import numpy as np
+
+from .. import last_result
+from ..mesh_arrays import read_array
+from .edit_selection import leave_edit_mode, select_elements
+
+
+class MESH_OT_ble_unwrap_select_narrow(bpy.types.Operator):
+    bl_idname = "mesh.ble_unwrap_select_narrow"
+    bl_label = "Select Narrow Charts"
+    bl_description = "In Edit Mode, select the faces of the last result's charts that are narrower than two texels"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not last_result.is_true(context):
+            cls.poll_message_set("Unwrap a mesh first")
+            return False
+        return True
+
+    def execute(self, context):
+        leave_edit_mode(context)
+        found = {
+            obj: shown
+            for obj, faces in last_result.narrow_faces(context).items()
+            if obj.visible_get() and (shown := visible_faces(obj.data, faces)).size
+        }
+        if not found:
+            self.report({"WARNING"}, "No visible face of these meshes is in a chart narrower than two texels")
+            return {"CANCELLED"}
+        select_elements(context, found, "FACE")
+        count = sum(map(len, found.values()))
+        self.report({"INFO"}, f"{count:,} face{'' if count == 1 else 's'} selected")
+        return {"FINISHED"}
+
+
+def visible_faces(mesh, faces):
+    """Those of the faces, by number, that are there and that edit mode would show."""
+    hidden = read_array(mesh.polygons, "hide", bool)
+    faces = np.array(faces, np.int64)
+    faces = faces[faces < len(hidden)]
+    return faces[~hidden[faces]]
+
+
+def register():
+    bpy.utils.register_class(MESH_OT_ble_unwrap_select_narrow)
+
+
+def unregister():
+    bpy.utils.unregister_class(MESH_OT_ble_unwrap_select_narrow)
