@@ -165,6 +165,28 @@ def test_crease_weight_out_of_range(square, value):
         native.unwrap(*square, crease_weight=value)
 
 
+# Front ----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("front", "up"), [("-y", 2), ("x", 2), ("z", 1)])
+@pytest.mark.parametrize("turn", [0, 1, 2, 3])
+@pytest.mark.parametrize("size", [(512, 512), (512, 256)])
+def test_what_is_up_where_a_front_is_given_is_up_in_the_layout(front, up, turn, size):
+    """A leaf that stands, its vertices beginning anywhere, so that the plane that it is flattened in has any turn."""
+    outline = np.array([(-1, 0), (1, 0), (0.7, 2), (0, 2.6), (-0.7, 2)], float)
+    positions = np.zeros((5, 3))
+    positions[:, (up + 1) % 3], positions[:, up] = np.roll(outline, turn, axis=0).T
+    width, height = size
+    options = {"texture_size": size} if width != height else {"texture_size": width}
+    result = native.unwrap(positions, np.arange(5, dtype=np.int32), np.array([0, 5], np.int32), front=front, **options)
+    uv, _ = arrays(result)
+    tip, foot = uv[(3 + turn) % 5], uv[[turn % 5, (1 + turn) % 5]].mean(axis=0)
+    upright = (tip - foot) * size
+    # It may lean, which is denser; and where the texture is no square, it may lie on its side, but not on its head.
+    assert upright[1] > (abs(upright[0]) if width == height else -0.01 * width)
+    assert result.certificate["valid"]
+
+
 # Limit over the atlas -------------------------------------------------------------------------------------------------
 
 

@@ -229,7 +229,6 @@ def test_planes_at_right_angles_lie_at_right_angles(name, number, kind):
     "cylinder in rows",
     "barrel",
     short={
-        "the cut steps aside by one quad near its end": ["cylinder in rows 3"],
         "where a cap hangs on the wall by an edge, the wall's straight side and the cap are bent": [
             *("barrel 1*", "barrel 2", "barrel 2, turned", "barrel 3"),
         ],
@@ -316,12 +315,8 @@ def test_rings_are_round_and_walls_are_rectangles(name, number, kind):
 @cases(
     "pipe bend",
     short={
-        "cut along the flank that is turned from the front, not inside the bend": ["1, turned", "2, turned"],
-        "cut along the flank that is turned from the front, where its quads are triangles": [
-            "1, triangles",
-            "2, triangles",
-        ],
-        "cut along the outside, away from the front, so that the strip has a waist": ["3, triangles"],
+        "cut along the outside, which is farther from the front": ["1*", "2*"],
+        "cut along the outside, which is farther from the front, so that the strip has a waist": ["3*"],
     },
 )
 def test_a_pipe_bend_is_a_rectangle_cut_on_the_inside_of_the_bend(name, number, kind):
@@ -331,7 +326,7 @@ def test_a_pipe_bend_is_a_rectangle_cut_on_the_inside_of_the_bend(name, number, 
     assert set((layout.seam_vertices % 12).ravel().tolist()) == {6}
 
 
-@cases("cable", short={"the cut steps aside by a quad again and again, so that the strips have steps": ["2*", "3*"]})
+@cases("cable", short={"the cut steps aside by a quad again and again, so that the strips have steps": ["3*"]})
 def test_a_cable_is_cut_along_one_line_into_rectangles(name, number, kind):
     layout, report = unwrapped(name, number, kind)
     for chart in range(report["charts"]):
@@ -374,7 +369,7 @@ def test_a_torus_is_one_or_two_rectangles(name, number, kind):
         assert_rectangle(layout, chart)
 
 
-@cases("torus", short={"the cut is elsewhere, and steps aside": ["1*", "3, triangles"]})
+@cases("torus", short={"the cut is elsewhere, and steps aside": ["1*"]})
 def test_a_torus_is_cut_along_its_inner_equator(name, number, kind):
     layout, _ = unwrapped(name, number, kind)
     base = common_shapes.mesh(name, number).positions
@@ -409,7 +404,6 @@ def test_a_gear_is_two_rings_and_strips_without_stretch(name, number, kind):
 @cases(
     "skirt",
     kinds=(0, 1),
-    short={"of two halves the longer border is joined, that of the front or of the back": ["1", "2"]},
 )
 def test_a_skirt_is_cut_along_its_back(name, number, kind):
     layout, report = unwrapped(name, number, kind)
@@ -484,10 +478,6 @@ def head_seams(number, kind):
     kinds=(0, 1),
     short={
         "a seam runs down the forehead": ["3"],
-        "where quads are triangles, no symmetry is seen, and seams cross nose and chin": [
-            "1, triangles",
-            "2, triangles",
-        ],
         "where quads are triangles, no symmetry is seen, and seams go around an ear": ["3, triangles"],
     },
 )
@@ -496,30 +486,14 @@ def test_no_seam_is_on_the_face(name, number, kind):
     assert not length[(middle[:, 1] < -0.25) & (middle[:, 2] < 0.7)].sum()
 
 
-@cases(
-    "head",
-    short={
-        "triangles whose diagonals are not mirrored count as no symmetry": [
-            "1, triangles",
-            "2, triangles",
-            "3, triangles",
-        ]
-    },
-)
+@cases("head")
 def test_the_seams_of_a_head_are_mirrored(name, number, kind):
     middle, length = head_seams(number, kind)
     apart = np.linalg.norm(middle[:, None] - (middle * (-1, 1, 1))[None], axis=-1).min(axis=1)
     assert length[apart < 0.01].sum() > 0.97 * length.sum()
 
 
-@cases(
-    "head",
-    kinds=(0, 1),
-    short={
-        "the face lies on its side or on its head": ["1", "3"],
-        "the face lies on its side or askew": ["1, triangles", "2, triangles", "3, triangles"],
-    },
-)
+@cases("head", kinds=(0, 1))
 def test_a_face_is_upright(name, number, kind):
     layout, _ = unwrapped(name, number, kind)
     place = layout.mesh.positions[layout.mesh.corner_vertices]
@@ -561,10 +535,8 @@ def test_no_quad_is_bent(name, number):
         "the caps hang on, or they are apart": ["barrel 2*", "barrel 3*"],
         "in one piece or in two": ["bevelled box 1*", "bracket 3*"],
         "flattened by planes, or rims and panels together": ["crate 3*"],
-        "cut along its inside or its outside": ["pipe bend *"],
         "strips are cut across at other places": ["cable 3*", "belt 1*"],
-        "cut along other lines": ["torus *", "UV sphere *", "ball 1*", "rock 3*"],
-        "cut symmetrically, or with two and a half times as much seam": ["head *"],
+        "cut along other lines": ["torus 1*", "ball 1*", "rock 3*"],
     },
 )
 def test_a_shape_is_cut_alike_in_quads_and_in_triangles(name, number, kind):

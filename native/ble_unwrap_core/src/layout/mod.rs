@@ -7,6 +7,7 @@ mod quads;
 mod scale;
 mod stacks;
 mod summary;
+mod upright;
 
 use std::collections::BTreeSet;
 
@@ -53,8 +54,7 @@ pub(crate) fn lay_out(
         run.progress.enter(Stage::Pack);
         scale::scale(&mut charts, settings);
         let stacks = Stacks::of(&charts, originals, &alone, settings, run.progress)?;
-        let limit = settings.chart_limit();
-        let layout = Placed::new(input, surface, &charts, &stacks, &packing, limit, run.progress)?;
+        let layout = Placed::new(input, surface, &charts, &stacks, &packing, settings, run.progress)?;
         // Where the margin may shrink, less is kept than was asked for, and that is proven.
         texture.margin = texture.margin.min(layout.margin);
         clock.lap("pack");

@@ -8,13 +8,15 @@ use crate::charts::Chart;
 use crate::error::UnwrapError;
 use crate::flattening::NEGLIGIBLE;
 use crate::mesh::{FaceId, MeshInput, Surface, VertexId};
-use crate::packing::{self, PackItem, PackSettings, Packed, Shortfall};
+use crate::packing::{self, PackItem, PackSettings, Packed, Rotation, Shortfall};
 use crate::progress::Progress;
 use crate::rounding::{self, Rounding, RoundingError};
+use crate::settings::Settings;
 use crate::stretch;
 
 use super::quads;
 use super::stacks::Stacks;
+use super::upright;
 
 /// Charts packed and rounded.
 #[derive(Default)]
@@ -44,12 +46,16 @@ impl Placed {
         charts: &[Chart],
         stacks: &Stacks,
         packing: &PackSettings,
-        limit: f64,
+        settings: &Settings,
         progress: &Progress,
     ) -> Result<Self, UnwrapError> {
+        let limit = settings.chart_limit();
         let own_place: Vec<usize> = (0..charts.len()).filter(|&number| stacks.lying[number].is_none()).collect();
         let alone: Vec<&Chart> = own_place.iter().map(|&number| &charts[number]).collect();
         let mut packed = pack(&alone, surface.scale, packing, progress)?;
+        if packing.rotation != Rotation::None {
+            packed.quarter_turns = upright::quarter_turns(input, surface, &alone, &packed, settings.front);
+        }
         let size = packed.size.map(f64::from);
         let mut layout = Self {
             uv: vec![[0.0; 2]; input.corner_vertices.len()],

@@ -297,6 +297,8 @@ pub(crate) struct Packed {
     pub margin: f64,
     /// For each item what lays it on whole texels after its pose, if anything does; empty where nothing was to be.
     snapped: Vec<Option<Snapped>>,
+    /// Quarter turns, counter-clockwise, by which each tile is turned at last: none or two where it is no square.
+    pub quarter_turns: usize,
 }
 
 impl Packed {
@@ -309,8 +311,14 @@ impl Packed {
         }
         let corner = self.tiles[item].corner();
         for p in &mut at {
-            p.x = p.x / f64::from(self.size[0]) + corner[0];
-            p.y = p.y / f64::from(self.size[1]) + corner[1];
+            let [x, y] = [p.x / f64::from(self.size[0]), p.y / f64::from(self.size[1])];
+            let [x, y] = match self.quarter_turns {
+                1 => [1.0 - y, x],
+                2 => [1.0 - x, 1.0 - y],
+                3 => [y, 1.0 - x],
+                _ => [x, y],
+            };
+            *p = Point2::new(x + corner[0], y + corner[1]);
         }
         at
     }
@@ -612,5 +620,6 @@ fn pack_apart(
         size,
         margin: asked.margin_texels,
         snapped,
+        quarter_turns: 0,
     })
 }

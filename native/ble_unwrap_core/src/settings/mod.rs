@@ -108,6 +108,15 @@ impl Front {
             Self::NegativeZ => Some([0.0, 0.0, -1.0]),
         }
     }
+
+    /// What is up where this is the front: Z, and Y for what faces along Z; none without a front.
+    pub(crate) fn up(self) -> Option<[f64; 3]> {
+        match self {
+            Self::None => None,
+            Self::Z | Self::NegativeZ => Some([0.0, 1.0, 0.0]),
+            Self::X | Self::NegativeX | Self::Y | Self::NegativeY => Some([0.0, 0.0, 1.0]),
+        }
+    }
 }
 
 /// Whether charts of mirrored surfaces are mirrored, too.

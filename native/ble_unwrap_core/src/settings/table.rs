@@ -403,7 +403,7 @@ pub static TABLE: &[Setting] = &[
         "How strongly seams are drawn to where they are hidden: under chins, behind ears, between limbs. A seam costs as much as \
          this power of how far it can be seen; 0 makes all places alike."),
     row("front", "Front", Group::Charts, Kind::Choice(|s| &mut s.front), "",
-        "Which side is looked at most."),
+        "Which side is looked at most. The layout is turned so that what is up on the object is up in it."),
     row("symmetry", "Symmetry", Group::Charts, Kind::Choice(|s| &mut s.symmetry), "",
         "Whether seams of mirrored surfaces are mirrored, too."),
     row("stack", "Stack", Group::Charts, Kind::Choice(|s| &mut s.stack), "",

@@ -68,7 +68,7 @@ class _ChartsGroup(TypedDict, total=False):
     hide_seams: float
     """How strongly seams are drawn to where they are hidden: under chins, behind ears, between limbs. A seam costs as much as this power of how far it can be seen; 0 makes all places alike."""
     front: Literal["none", "x", "-x", "y", "-y", "z", "-z"]
-    """Which side is looked at most. "none": No side more than another. "x": Seams are drawn away from what faces along X. "-x": Seams are drawn away from what faces against X. "y": Seams are drawn away from what faces along Y. "-y": Seams are drawn away from what faces against Y, as the faces of figures do in Blender. "z": Seams are drawn away from what faces along Z. "-z": Seams are drawn away from what faces against Z."""
+    """Which side is looked at most. The layout is turned so that what is up on the object is up in it. "none": No side more than another. "x": Seams are drawn away from what faces along X. "-x": Seams are drawn away from what faces against X. "y": Seams are drawn away from what faces along Y. "-y": Seams are drawn away from what faces against Y, as the faces of figures do in Blender. "z": Seams are drawn away from what faces along Z. "-z": Seams are drawn away from what faces against Z."""
     symmetry: Literal["auto", "off"]
     """Whether seams of mirrored surfaces are mirrored, too. "auto": Where a piece has a mirror plane along edges, so have its seams. "off": Seams are found without regard to mirror planes."""
     stack: Literal["off", "equal", "mirrored"]
