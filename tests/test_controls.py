@@ -170,12 +170,12 @@ def test_crease_weight_out_of_range(square, value):
 
 @pytest.mark.parametrize(("front", "up"), [("-y", 2), ("x", 2), ("z", 1)])
 @pytest.mark.parametrize("turn", [0, 1, 2, 3])
-@pytest.mark.parametrize("size", [(512, 512), (512, 256)])
-def test_what_is_up_where_a_front_is_given_is_up_in_the_layout(front, up, turn, size):
+@pytest.mark.parametrize(("size", "unit"), [((512, 512), 1), ((512, 512), 1e-3), ((512, 512), 1e3), ((512, 256), 1)])
+def test_what_is_up_where_a_front_is_given_is_up_in_the_layout(front, up, turn, size, unit):
     """A leaf that stands, its vertices beginning anywhere, so that the plane that it is flattened in has any turn."""
     outline = np.array([(-1, 0), (1, 0), (0.7, 2), (0, 2.6), (-0.7, 2)], float)
     positions = np.zeros((5, 3))
-    positions[:, (up + 1) % 3], positions[:, up] = np.roll(outline, turn, axis=0).T
+    positions[:, (up + 1) % 3], positions[:, up] = unit * np.roll(outline, turn, axis=0).T
     width, height = size
     options = {"texture_size": size} if width != height else {"texture_size": width}
     result = native.unwrap(positions, np.arange(5, dtype=np.int32), np.array([0, 5], np.int32), front=front, **options)
@@ -185,6 +185,14 @@ def test_what_is_up_where_a_front_is_given_is_up_in_the_layout(front, up, turn, 
     # It may lean, which is denser; and where the texture is no square, it may lie on its side, but not on its head.
     assert upright[1] > (abs(upright[0]) if width == height else -0.01 * width)
     assert result.certificate["valid"]
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1, 1e3])
+def test_a_layout_of_which_no_side_is_up_is_not_turned(unit):
+    """A floor, which is packed as without a front, whatever the unit."""
+    outline = unit * np.array([(-1, 0, 0), (1, 0, 0), (0.7, 2, 0), (0, 2.6, 0), (-0.7, 2, 0)])
+    mesh = outline, np.arange(5, dtype=np.int32), np.array([0, 5], np.int32)
+    assert_array_equal(native.unwrap(*mesh, front="-y").uv, native.unwrap(*mesh).uv)
 
 
 # Limit over the atlas -------------------------------------------------------------------------------------------------

@@ -160,7 +160,7 @@ def test_a_box_is_a_cross_a_t_or_six_rectangles(name, number, kind):
     assert all(is_symmetric(outline(layout, chart)) for chart in range(report["charts"]))
 
 
-@cases("bevelled box", short={"the end that hangs on the strip leans by more than a degree": ["2*"]})
+@cases("bevelled box")
 def test_the_flat_sides_of_a_bevelled_box_are_rectangles_along_the_axes(name, number, kind):
     layout, report = unwrapped(name, number, kind)
     base = common_shapes.mesh(name, number).positions
@@ -229,8 +229,8 @@ def test_planes_at_right_angles_lie_at_right_angles(name, number, kind):
     "cylinder in rows",
     "barrel",
     short={
-        "where a cap hangs on the wall by an edge, the wall's straight side and the cap are bent": [
-            *("barrel 1*", "barrel 2", "barrel 2, turned", "barrel 3"),
+        "where a cap hangs on the wall by two edges, the wall's straight side and the cap are bent": [
+            "barrel 1, triangles"
         ],
         "cut across its belly instead of along its back": ["barrel 3, turned"],
     },
@@ -291,7 +291,7 @@ def test_a_cone_is_a_fan_and_a_disc_cut_at_its_back(name, number, kind):
     assert len(cuts) == 1 and (kind == 2 or is_at_the_back(name, number, cuts[cuts != SIDES]))
 
 
-@cases("flange", short={"where a strip hangs on a ring by an edge, the ring is bent by 2 %": ["*"]})
+@cases("flange")
 def test_rings_are_round_and_walls_are_rectangles(name, number, kind):
     layout, report = unwrapped(name, number, kind)
     profile = np.arange(len(layout.mesh.positions)) // SIDES
@@ -532,8 +532,8 @@ def test_no_quad_is_bent(name, number):
     *common_shapes.SHAPES,
     kinds=(1,),
     short={
-        "the caps hang on, or they are apart": ["barrel 2*", "barrel 3*"],
-        "in one piece or in two": ["bevelled box 1*", "bracket 3*"],
+        "a cap hangs on, or it is apart": ["barrel 1*"],
+        "in one piece or in two": ["bracket 3*"],
         "flattened by planes, or rims and panels together": ["crate 3*"],
         "strips are cut across at other places": ["cable 3*", "belt 1*"],
         "cut along other lines": ["torus 1*", "ball 1*", "rock 3*"],

@@ -193,7 +193,9 @@ pub(crate) fn to_python(py: Python<'_>, atlas: ble_unwrap_core::Atlas) -> PyResu
 /// InternalError
 ///     If the library is at fault.
 ///
-/// Notes ----- Guaranteed, and checked on the float32 values returned: no triangle is flipped, no chart overlaps itself
+/// Notes
+/// -----
+/// Guaranteed, and checked on the float32 values returned: no triangle is flipped, no chart overlaps itself
 /// or another, unless ``stack`` asks for it, charts keep the margin, each chart is under ``chart_limit`` or counted in
 /// ``charts_over_limit`` (a single face may not flatten under it); ``l2`` is under ``atlas_limit`` or a warning says
 /// so. The result is the same, bit for bit, for any number of threads. Not guaranteed: the fewest charts or the

@@ -3,65 +3,59 @@
 //! Where cuts are drawn to places that are seldom seen, the cheapest one steps sideways for every little that this saves, and what is cut
 //! open there has stairs for a border. Along a line of edges that goes straight on, the wall of a tube becomes a rectangle.
 
-use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
-use crate::mesh::{HalfedgeId, TriMesh, VertexId, measure};
+use crate::mesh::{HalfedgeId, TriMesh, measure};
 
 /// A line goes straight on where the angles on its two sides differ from half of the whole angle around the vertex by less than 10°.
 const MOST_TURN: f64 = PI / 18.0;
 
-/// The cheapest by `weight` of the lines of edges that go straight on from one of two boundary loops to the other, and what it costs; none
-/// of its edges is `forbidden`. `None` where there is none, or where there are not two loops. O(n) where few lines meet, and never more than
-/// that times the edges at a loop.
+/// Edges that are followed in search of a line, at most so many times as many as there are vertices.
+const MOST_FOLLOWED: usize = 24;
+
+/// The cheapest by `weight` of the lines of edges that go straight on from one of two boundary loops to the other, if one costs at most `most`; none
+/// of its edges is `forbidden`, and it meets no vertex twice. `None` where there is none, or where there are not two loops. It need not be
+/// found where very many lines wind around a tube. O(n).
 pub(crate) fn straight_cut(
     mesh: &TriMesh,
+    most: f64,
     weight: impl Fn(HalfedgeId) -> f64,
     forbidden: impl Fn(HalfedgeId) -> bool,
-) -> Option<(Vec<HalfedgeId>, f64)> {
+) -> Option<Vec<HalfedgeId>> {
     let loops = mesh.boundary_loops();
     if loops.len() != 2 {
         return None;
     }
     let (one, other) = (loops.group(0), loops.group(1));
     let (from, to) = if one.len() <= other.len() { (one, other) } else { (other, one) };
-    let ends: BTreeSet<VertexId> = to.iter().map(|&h| mesh.from(h)).collect();
+    let mut is_end = vec![false; mesh.vertex_count()];
+    to.iter().for_each(|&h| is_end[mesh.from(h).index()] = true);
     let is_open = |h: HalfedgeId| !mesh.is_boundary(h) && !forbidden(h) && !forbidden(mesh.twin(h));
+    // The last line that met each vertex.
+    let mut met_by = vec![0usize; mesh.vertex_count()];
+    let mut left = MOST_FOLLOWED * mesh.vertex_count();
     let mut best: Option<(Vec<HalfedgeId>, f64)> = None;
     let starts = from.iter().flat_map(|&h| mesh.outgoing(mesh.from(h)).filter(|&h| is_open(h)));
-    for first in starts {
-        let most = best.as_ref().map_or(f64::INFINITY, |(_, cost)| *cost);
-        if let Some(line) = line(mesh, first, &ends, most, &weight, &is_open) {
-            best = Some(line);
+    for (line, first) in (1..).zip(starts) {
+        let (mut path, mut cost, mut next) = (Vec::new(), 0.0, Some(first));
+        met_by[mesh.from(first).index()] = line;
+        while let Some(h) = next {
+            let v = mesh.to(h);
+            cost += weight(h);
+            let is_dear = best.as_ref().map_or(cost > most, |(_, least)| cost >= *least);
+            if left == 0 || is_dear || std::mem::replace(&mut met_by[v.index()], line) == line {
+                break;
+            }
+            left -= 1;
+            path.push(h);
+            if is_end[v.index()] {
+                best = Some((path, cost));
+                break;
+            }
+            next = if mesh.is_boundary_vertex(v) { None } else { straight_on(mesh, mesh.twin(h), &is_open) };
         }
     }
-    best
-}
-
-/// The line that begins with an edge, if it costs less than so much.
-fn line(
-    mesh: &TriMesh,
-    first: HalfedgeId,
-    ends: &BTreeSet<VertexId>,
-    most: f64,
-    weight: &impl Fn(HalfedgeId) -> f64,
-    is_open: &impl Fn(HalfedgeId) -> bool,
-) -> Option<(Vec<HalfedgeId>, f64)> {
-    let (mut path, mut cost, mut next) = (Vec::new(), 0.0, first);
-    // A line that winds has no more edges than there are vertices.
-    for _ in 0..mesh.vertex_count() {
-        path.push(next);
-        cost += weight(next);
-        let v = mesh.to(next);
-        if ends.contains(&v) {
-            return (cost < most).then_some((path, cost));
-        }
-        if cost >= most || mesh.is_boundary_vertex(v) {
-            return None;
-        }
-        next = straight_on(mesh, mesh.twin(next), is_open)?;
-    }
-    None
+    best.map(|(path, _)| path)
 }
 
 /// Of the open half-edges that leave a vertex inside, the one that goes on where one that leads back came from.
@@ -81,6 +75,7 @@ fn straight_on(mesh: &TriMesh, back: HalfedgeId, is_open: &impl Fn(HalfedgeId) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::charts::cut_to_disk;
     use crate::mesh::test_surfaces;
     use nalgebra::Point3;
 
@@ -101,32 +96,63 @@ mod tests {
     #[test]
     fn the_cheapest_column_is_taken_though_a_path_with_steps_is_cheaper() {
         let mesh = tube(12, 6);
-        // Cheap places wind around the tube; one column is a little cheaper than the others.
+        // Cheap places wind around the tube, and to step aside costs little; one column is cheaper than the others.
         let weight = |h: HalfedgeId| {
             let middle = nalgebra::center(&mesh.position(mesh.from(h)), &mesh.position(mesh.to(h)));
             let steps = (middle.y.atan2(middle.x) - 0.7 * middle.z).cos();
-            let column = if (middle.x - 1.0).abs() < 1e-9 { 0.3 } else { 0.0 };
-            mesh.edge_length(h) * (1.0 - 0.4 * steps - column)
+            let column = if (middle.x - 1.0).abs() < 1e-9 { 0.4 } else { 0.0 };
+            let is_step = mesh.position(mesh.from(h)).z == mesh.position(mesh.to(h)).z;
+            mesh.edge_length(h) * (1.0 - 0.4 * steps - column) * if is_step { 0.05 } else { 1.0 }
         };
-        let (path, cost) = straight_cut(&mesh, weight, |_| false).expect("a column");
+        let path = straight_cut(&mesh, 10.0, weight, |_| false).expect("a column");
         assert_eq!(path.len(), 6);
         assert!(path.iter().all(|&h| (mesh.position(mesh.from(h)).x - 1.0).abs() < 1e-9));
-        assert!((cost - path.iter().map(|&h| weight(h)).sum::<f64>()).abs() < 1e-12);
-        // Where that column must not be cut another one is.
-        let is_there = |h: HalfedgeId| mesh.position(mesh.from(h)).x > 1.0 - 1e-9;
-        let (other, dearer) = straight_cut(&mesh, weight, is_there).expect("another");
-        assert!(dearer >= cost && !other.iter().any(|&h| is_there(h)));
+        let cost = |path: &[HalfedgeId]| path.iter().map(|&h| weight(h)).sum::<f64>();
+        let shortest = cut_to_disk(&mesh, weight, |_| false);
+        assert!(cost(&shortest) < cost(&path));
+        assert_eq!(straight_cut(&mesh, cost(&shortest), weight, |_| false), None, "it costs too much");
+        // Where that column must not be cut another one is; either side may say so.
+        let is_there = |h: HalfedgeId| mesh.position(mesh.from(h)).x > 1.0 - 1e-9 && h < mesh.twin(h);
+        let other = straight_cut(&mesh, 10.0, weight, is_there).expect("another");
+        assert!(cost(&other) >= cost(&path) && !other.iter().any(|&h| is_there(h) || is_there(mesh.twin(h))));
+    }
+
+    /// A cone of which a quarter of a turn is unrolled, cut off below its tip and pierced there: lines that wind around it come back to where they were.
+    #[test]
+    fn a_line_meets_no_vertex_twice() {
+        let mesh = tube(8, 40);
+        let slender: Vec<_> = mesh
+            .positions()
+            .iter()
+            .map(|p| {
+                let radius = 0.2 * (1.0 + p.z);
+                Point3::new(radius * p.x, radius * p.y, p.z)
+            })
+            .collect();
+        let triangles: Vec<_> = mesh.triangles().iter().map(|t| t.map(|v| v.index() as u32)).collect();
+        let mesh = test_surfaces::mesh(&slender, &triangles);
+        // Columns must not be cut: what is left are lines along diagonals, and rings.
+        let is_column = |h: HalfedgeId| {
+            let [p, q] = [mesh.from(h), mesh.to(h)].map(|v| mesh.position(v));
+            (p.y.atan2(p.x) - q.y.atan2(q.x)).abs() < 1e-9
+        };
+        if let Some(path) = straight_cut(&mesh, f64::INFINITY, |h| mesh.edge_length(h), is_column) {
+            let mut met: Vec<_> = path.iter().map(|&h| mesh.to(h)).collect();
+            met.sort_unstable();
+            met.dedup();
+            assert_eq!(met.len(), path.len());
+        }
     }
 
     #[test]
     fn there_is_none_where_nothing_goes_straight_on_or_there_are_not_two_loops() {
         let length =
-            |mesh: &TriMesh| straight_cut(mesh, |h| mesh.edge_length(h), |_| false).map(|(path, _)| path.len());
+            |mesh: &TriMesh| straight_cut(mesh, 1e9, |h| mesh.edge_length(h), |_| false).map(|path| path.len());
         assert_eq!(length(&test_surfaces::grid(4, 4, [4.0, 4.0], 0.0)), None);
         assert_eq!(length(&test_surfaces::sphere(2)), None);
         let mesh = tube(8, 4);
         let rows = |h: HalfedgeId| mesh.position(mesh.from(h)).z != mesh.position(mesh.to(h)).z;
-        assert_eq!(straight_cut(&mesh, |h| mesh.edge_length(h), rows), None);
+        assert_eq!(straight_cut(&mesh, 1e9, |h| mesh.edge_length(h), rows), None);
         assert_eq!(length(&mesh), Some(4));
     }
 }

@@ -6,7 +6,7 @@ use crate::cache::Run;
 use crate::charts::{self, Chart, Patch};
 use crate::flattening::{self, Flattened, Positions, Rung, Rungs};
 use crate::geodesics::LandmarkDistances;
-use crate::mesh::{HalfedgeId, Topology};
+use crate::mesh::Topology;
 use crate::progress::Cancelled;
 use crate::segmentation::{self, SpectralAnalysis};
 use crate::settings::{Holes, Moves, Settings};
@@ -174,12 +174,9 @@ impl<'a> Attempt<'a> {
         let cuts = charts::cut_to_disk(&patch.mesh, price, |h| patch.is_diagonal(h));
         if self.topology.loops == 2 && self.topology.genus() == 0 && !cost::may_bend(self.settings.stretch_price) {
             // A straight border is worth as much here as anywhere.
-            let straight = charts::straight_cut(&patch.mesh, price, |h| patch.is_diagonal(h));
-            let least: f64 = cuts.iter().map(|&h| price(h)).sum();
-            let length = |cut: &[HalfedgeId]| cut.iter().map(|&h| patch.mesh.edge_length(h)).sum::<f64>();
-            if let Some((line, cost)) = straight
-                && cost <= least + self.settings.straighten * length(&line)
-            {
+            let worth: f64 =
+                cuts.iter().map(|&h| price(h) + self.settings.straighten * patch.mesh.edge_length(h)).sum();
+            if let Some(line) = charts::straight_cut(&patch.mesh, worth, price, |h| patch.is_diagonal(h)) {
                 return patch.cut(&line);
             }
         }

@@ -124,7 +124,7 @@ impl Originals {
         let image = |side: &DescribedSide| self.in_first_half.get(side.original.index()).copied();
         let images: Option<Vec<HalfedgeId>> =
             sides.iter().map(|(side, _)| image(side).filter(|h| !h.is_none())).collect();
-        // A chart that reaches across the plane has no image but itself.
+        // A chart of the second half counts as a copy of its image in the first; one that reaches across the plane has no image there.
         if let Some(images) = images {
             sides.iter_mut().zip(images).for_each(|((side, _), image)| side.original = image);
             is_mirrored = !is_mirrored;

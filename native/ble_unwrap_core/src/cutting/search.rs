@@ -11,8 +11,9 @@ use crate::progress::Cancelled;
 use crate::settings::Settings;
 
 use super::cost::{self, Price};
+use super::edit::Edit;
 use super::history::{History, MoveKind};
-use super::moves::{Move, Proposal, Site};
+use super::moves::{Move, Site};
 use super::state::{ChartId, Cutting};
 use super::trial::{Verdict, trial};
 
@@ -93,10 +94,11 @@ pub(super) fn tried(
     let mut verdict = Verdict::Refused;
     let price = price.map(|price| made.price(*price));
     let old: Vec<&Chart> = site.charts.iter().filter_map(|&id| cutting.chart(id)).collect();
-    let mut best: Option<(f64, Proposal, Vec<Chart>)> = None;
+    let mut best: Option<(f64, Vec<Chart>)> = None;
+    let mut made_by: Vec<Edit> = Vec::new();
     for way in made.ways(cutting, site, run)? {
         // From another start the same edit makes the same charts, or hardly better ones.
-        if best.as_ref().is_some_and(|(_, made, _)| made.edit.glued() == way.edit.glued()) {
+        if made_by.iter().any(|edit| edit.glued() == way.edit.glued()) {
             continue;
         }
         let glued = way.edit.glued_length(cutting);
@@ -116,11 +118,12 @@ pub(super) fn tried(
                 if !made.takes_cheapest() {
                     return Ok((Verdict::Charts(charts), rungs));
                 }
-                if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
-                    best = Some((cost, way, charts));
+                made_by.push(way.edit);
+                if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                    best = Some((cost, charts));
                 }
             }
         }
     }
-    Ok((best.map_or(verdict, |(_, _, charts)| Verdict::Charts(charts)), rungs))
+    Ok((best.map_or(verdict, |(_, charts)| Verdict::Charts(charts)), rungs))
 }

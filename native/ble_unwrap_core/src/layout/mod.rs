@@ -47,6 +47,7 @@ pub(crate) fn lay_out(
 ) -> Result<Atlas, UnwrapError> {
     let arrays = LayoutArrays::new(input, surface);
     let mut texture = Texture::of(&settings.packing);
+    let margin = texture.margin;
     let mut packing = settings.packing.with_whole_margin();
     let mut round = 0;
     let mut alone = BTreeSet::new();
@@ -56,7 +57,7 @@ pub(crate) fn lay_out(
         let stacks = Stacks::of(&charts, originals, &alone, settings, run.progress)?;
         let layout = Placed::new(input, surface, &charts, &stacks, &packing, settings, run.progress)?;
         // Where the margin may shrink, less is kept than was asked for, and that is proven.
-        texture.margin = texture.margin.min(layout.margin);
+        texture.margin = margin.min(layout.margin);
         clock.lap("pack");
         round += 1;
         if !layout.unstackable.is_empty() && round < MOST_ROUNDS {

@@ -15,7 +15,7 @@ use crate::settings::Settings;
 use crate::stretch;
 
 use super::quads;
-use super::stacks::Stacks;
+use super::stacks::{Lying, Stacks};
 use super::upright;
 
 /// Charts packed and rounded.
@@ -76,7 +76,12 @@ impl Placed {
             progress.check()?;
             let chart = &charts[number];
             let mut exact = packed.uvs(item, &chart.uv);
-            if packed.is_snapped(item) && exceeds(chart, &exact, size, limit) {
+            let lying = || charts.iter().zip(&stacks.lying).filter_map(|(c, lying)| Some((c, lying.as_ref()?)));
+            let exceeds_here = |(chart, lying): (&Chart, &Lying)| {
+                let there = || lying.vertex.iter().map(|v| exact[v.index()]).collect::<Vec<_>>();
+                lying.on == number && exceeds(chart, &there(), size, limit)
+            };
+            if packed.is_snapped(item) && (exceeds(chart, &exact, size, limit) || lying().any(exceeds_here)) {
                 packed.unsnap(item);
                 exact = packed.uvs(item, &chart.uv);
             }

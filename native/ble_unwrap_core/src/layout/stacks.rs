@@ -21,8 +21,8 @@ use crate::stretch;
 
 /// What lies on another chart may be stretched by so much more than where it lay: copies are alike to a thousandth.
 const MOST_RISE: f64 = 1e-2;
-/// Of charts with the same description, those that do not lie on the first are tried on so many others. There are
-/// hardly ever any.
+/// Of charts with the same description, those that do not lie on the first are tried on so many others: the
+/// description hardly ever leaves any.
 const MOST_BASES: usize = 4;
 
 /// How a chart lies on another.
@@ -165,7 +165,9 @@ fn lying(
         if is_mirrored { Point2::new(-p.x, p.y) } else { p }
     };
     let uv: Vec<Point2<f64>> = vertex.iter().map(seen).collect();
-    let limit = settings.chart_limit().max(chart.l2 + MOST_RISE);
+    // What is over the limit by itself is no worse here than elsewhere.
+    let limit = settings.chart_limit();
+    let limit = if chart.l2 > limit { chart.l2 + MOST_RISE } else { limit };
     let fits = stretch::first_flip(mesh, &uv).is_none()
         && stretch::l2_stretch(mesh, &RestTriangle::of_mesh(mesh), &uv) <= limit;
     fits.then_some(Lying { on: *on, is_mirrored, vertex })

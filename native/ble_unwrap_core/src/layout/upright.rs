@@ -10,7 +10,8 @@ use crate::mesh::{MeshInput, Surface, VertexId};
 use crate::packing::Packed;
 use crate::settings::Front;
 
-/// What is turned less than this towards one side in the mean, of 1 for a wall, is turned towards none: a floor, or walls that lie on all sides.
+/// Up points nowhere in a layout where, in the mean over its area, less than this share of a unit of length upwards on the object leads any way: of a
+/// floor nothing leads upwards, and of walls that lie in all directions what each does cancels out.
 const LEAST_LEANING: f64 = 0.02;
 
 /// Quarter turns, counter-clockwise. `charts` are those that `packed` has places of, in its order. None where no front is given, since then nothing
@@ -28,7 +29,7 @@ pub(super) fn quarter_turns(
         let (upwards, area) = upwards(input, surface, chart, up);
         let [from, to] = [Vector2::zeros(), upwards].map(|p| packed.poses[item].texel(p.into()));
         sum += to - from;
-        most += area * packed.texels_per_unit;
+        most += area * packed.poses[item].scale;
     }
     // What each number of turns brings to where up is.
     let found = [sum.y, sum.x, -sum.y, -sum.x];

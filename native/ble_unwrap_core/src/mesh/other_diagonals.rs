@@ -14,13 +14,20 @@ use super::tri_mesh::TriMesh;
 use crate::collections::DisjointSets;
 use crate::progress::{Cancelled, Progress};
 
+/// The two diagonals of a quad pass each other within so many tolerances: three hundredths of the extent. Else the surface is another, as
+/// where a ridge on one side is a valley on the other.
+const FLAT: f64 = 30.0;
+/// Where a cell has more vertices, detail is finer than the tolerance can tell apart, and no plane is looked for.
+const MOST_IN_CELL: usize = 64;
+/// Iterations for three principal axes, far more than they take.
+const MOST_ITERATIONS: usize = 100;
 /// Sides of the cells that vertices are sorted into, in tolerances: a ball of one tolerance meets two cells along each axis at most.
 const CELL: f64 = 4.0;
 
 /// Larger polygons of a connected mesh, each of which has a mirror image across one plane: a label for each face, where two that meet at an
 /// edge have the same if its image is the other diagonal of theirs. `polygon` names the polygon of each face. `None` where no plane through the
 /// mean of the vertices, across a principal axis of theirs or an axis of the coordinates, mirrors all, or where one mirrors all polygons as they
-/// are. O(n log n).
+/// are; nor where vertices are too near to each other, as the two sides of a cut are. O(n).
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
@@ -30,12 +37,12 @@ pub(crate) fn mirrored_polygons(
     progress: &Progress,
 ) -> Result<Option<Vec<u32>>, Cancelled> {
     let Some(shape) = Shape::new(mesh, polygon) else { return Ok(None) };
-    let cells = Cells::new(mesh.positions(), shape.tolerance);
+    let Some(cells) = Cells::new(mesh.positions(), shape.tolerance) else { return Ok(None) };
     let middle = Point3::from(mean(mesh));
     for normal in normals(mesh) {
         progress.check()?;
         if let Some(image) = images(mesh, &cells, middle, normal) {
-            return Ok(merged(mesh, polygon, &image));
+            return Ok(merged(mesh, polygon, &image, shape.tolerance));
         }
     }
     Ok(None)
@@ -51,8 +58,8 @@ fn normals(mesh: &TriMesh) -> Vec<Vector3<f64>> {
     let middle = mean(mesh);
     let scatter: Matrix3<f64> =
         mesh.positions().iter().map(|p| (p.coords - middle) * (p.coords - middle).transpose()).sum();
-    let axes = SymmetricEigen::new(scatter).eigenvectors;
-    let of_mesh = (0..3).map(|k| axes.column(k).into_owned());
+    let axes = SymmetricEigen::try_new(scatter, f64::EPSILON, MOST_ITERATIONS).map(|eigen| eigen.eigenvectors);
+    let of_mesh = axes.into_iter().flat_map(|axes| (0..3).map(move |k| axes.column(k).into_owned()));
     [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().chain(of_mesh).collect()
 }
 
@@ -64,13 +71,17 @@ fn images(mesh: &TriMesh, cells: &Cells<'_>, middle: Point3<f64>, normal: Vector
 }
 
 /// The labels by which every polygon has an image; `None` where one has none, or nothing is merged.
-fn merged(mesh: &TriMesh, polygon: &[u32], image: &[VertexId]) -> Option<Vec<u32>> {
+fn merged(mesh: &TriMesh, polygon: &[u32], image: &[VertexId], tolerance: f64) -> Option<Vec<u32>> {
     let mut sets = DisjointSets::new(mesh.face_count());
     let mut is_merged = false;
     let image = |v: VertexId| image[v.index()];
+    let key = |v: VertexId, w: VertexId| (v.min(w), v.max(w));
+    let edges: HashMap<(VertexId, VertexId), HalfedgeId> =
+        mesh.edges().map(|h| (key(mesh.from(h), mesh.to(h)), h)).collect();
+    let edge = |v: VertexId, w: VertexId| edges.get(&key(v, w)).copied();
     for h in mesh.edges() {
         let t = mesh.twin(h);
-        let is_edge = edge(mesh, image(mesh.from(h)), image(mesh.to(h))).is_some();
+        let is_edge = edge(image(mesh.from(h)), image(mesh.to(h))).is_some();
         if t.is_none() {
             // A boundary is no diagonal.
             if !is_edge {
@@ -83,7 +94,11 @@ fn merged(mesh: &TriMesh, polygon: &[u32], image: &[VertexId]) -> Option<Vec<u32
             sets.join(f, g);
         } else if !is_edge {
             let beyond = |h: HalfedgeId| image(mesh.from(h.prev()));
-            let other = edge(mesh, beyond(h), beyond(t)).filter(|&other| !mesh.is_boundary(other))?;
+            let other = edge(beyond(h), beyond(t)).filter(|&other| !mesh.is_boundary(other))?;
+            let [along, across] = [[mesh.from(h), mesh.to(h)], [mesh.from(h.prev()), mesh.from(t.prev())]];
+            if apart(mesh, along, across) > FLAT * tolerance {
+                return None;
+            }
             let corners = [other, mesh.twin(other)].map(|side| mesh.from(side.prev()));
             let ends = [image(mesh.from(h)), image(mesh.to(h))];
             if corners != ends && corners != [ends[1], ends[0]] {
@@ -96,10 +111,11 @@ fn merged(mesh: &TriMesh, polygon: &[u32], image: &[VertexId]) -> Option<Vec<u32
     is_merged.then(|| sets.labels().0)
 }
 
-/// A side of the edge between two vertices, if they are neighbours.
-fn edge(mesh: &TriMesh, v: VertexId, w: VertexId) -> Option<HalfedgeId> {
-    let towards = |v: VertexId, w: VertexId| mesh.outgoing(v).find(|&h| mesh.to(h) == w);
-    towards(v, w).or_else(|| towards(w, v))
+/// How far the lines through two diagonals of four corners are from each other; how far their middles are, where both run along one line.
+fn apart(mesh: &TriMesh, along: [VertexId; 2], across: [VertexId; 2]) -> f64 {
+    let [[a, b], [c, d]] = [along, across].map(|ends| ends.map(|v| mesh.position(v)));
+    let between = nalgebra::center(&c, &d) - nalgebra::center(&a, &b);
+    (b - a).cross(&(d - c)).try_normalize(f64::MIN_POSITIVE).map_or(between.norm(), |normal| between.dot(&normal).abs())
 }
 
 /// Points by the cell of a grid that they lie in.
@@ -110,13 +126,14 @@ struct Cells<'a> {
 }
 
 impl<'a> Cells<'a> {
-    fn new(points: &'a [Point3<f64>], tolerance: f64) -> Self {
+    /// `None` where a cell has too many.
+    fn new(points: &'a [Point3<f64>], tolerance: f64) -> Option<Self> {
         let mut cells = Self { points, tolerance, members: HashMap::with_capacity(points.len()) };
         for (i, p) in points.iter().enumerate() {
             let cell = cells.cell(p.coords);
             cells.members.entry(cell).or_default().push(VertexId::new(i).index() as u32);
         }
-        cells
+        cells.members.values().all(|members| members.len() <= MOST_IN_CELL).then_some(cells)
     }
 
     fn cell(&self, p: Vector3<f64>) -> [i64; 3] {
@@ -197,6 +214,31 @@ mod tests {
         let quads: Vec<usize> = (0..64).filter(|&q| merged(2 * q)).collect();
         assert_eq!(quads, [2 * 8 + 1, 2 * 8 + 6]);
         assert!(found(&sheet(|p| p, |x, _| x >= 4)).is_none(), "nothing to merge");
+    }
+
+    #[test]
+    fn a_ridge_is_no_diagonal_of_a_valley() {
+        // One quad is folded along its diagonal, its image along the other one, as sharply.
+        let folded = |height: f64| {
+            move |p: Point3<f64>| match (p.x, p.y) {
+                (2.0, 3.0) | (6.0, 3.0) => p + Vector3::z() * height,
+                _ => p,
+            }
+        };
+        assert!(found(&sheet(folded(0.1), |_, _| false)).is_some());
+        assert!(found(&sheet(folded(3.0), |_, _| false)).is_none());
+    }
+
+    #[test]
+    fn detail_finer_than_the_tolerance_is_not_looked_at() {
+        let near =
+            |count: usize| -> Vec<Point3<f64>> { (0..count).map(|i| Point3::new(1e-6 * i as f64, 0.0, 0.0)).collect() };
+        assert!(Cells::new(&near(MOST_IN_CELL), 1.0).is_some() && Cells::new(&near(MOST_IN_CELL + 1), 1.0).is_none());
+        let points = near(10);
+        let cells = Cells::new(&points, 1e-7).expect("apart");
+        let place = |x: f64| cells.nearest(Point3::new(x, 0.0, 0.0));
+        assert_eq!(place(3.02e-6), Some(VertexId::new(3)));
+        assert_eq!(place(3.5e-6), None);
     }
 
     #[test]

@@ -113,7 +113,7 @@ pub enum Rotation {
 choices!(Rotation {
     Aligned: "aligned", "Aligned", "Charts with straight borders lie along the axes, symmetric ones upright or level, others at any angle.";
     Any: "any", "Any", "Charts are turned by any angle, which packs tightest.";
-    Quarter: "quarter", "Quarter Turns", "Charts are turned by multiples of 90° from how they were flattened, not set upright.";
+    Quarter: "quarter", "Quarter Turns", "Charts are turned by multiples of 90° from how they were flattened, none set upright by itself.";
     None: "none", "None", "Charts stay as they were flattened, at whatever angle that is.";
 });
 

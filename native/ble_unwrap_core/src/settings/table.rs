@@ -407,7 +407,7 @@ pub static TABLE: &[Setting] = &[
     row("symmetry", "Symmetry", Group::Charts, Kind::Choice(|s| &mut s.symmetry), "",
         "Whether seams of mirrored surfaces are mirrored, too."),
     row("stack", "Stack", Group::Charts, Kind::Choice(|s| &mut s.stack), "",
-        "Which charts lie on each other, so that like parts share their pixels and all charts get more of them."),
+        "Which charts lie on each other, so that like parts share their pixels and all charts get more of them. Nothing is copied, and so nothing stacked, under a limit over the atlas or with fewer moves."),
     row("style", "Style", Group::Charts, Kind::Choice(|s| &mut s.style), "",
         "Whether planes, cylinders and the like between hard edges keep their shape."),
     row("straighten", "Straighten", Group::Charts, Kind::Real(|s| &mut s.straighten, Interval::closed(0.0, 10.0)), "",

@@ -72,7 +72,7 @@ pub(super) trait Move: Sync {
         false
     }
 
-    /// What is to be tried at a site, in this order, until something does, or all of it.
+    /// What is to be tried at a site, in this order: until a trial comes to something, or all of it where the cheapest is taken.
     ///
     /// # Errors
     /// The caller cancelled, or there is not enough memory.
