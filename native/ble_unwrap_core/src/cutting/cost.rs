@@ -25,7 +25,7 @@ pub(super) const CHART: f64 = 1.5;
 /// A chart of at most this L2 stretch is unrolled: half a degree between the normals of two faces gives 1.0001, and nobody sees a
 /// tenth of a per cent.
 const UNROLLED: f64 = 1.001;
-/// No place of what unrolls is longer or shorter than on the surface by more than this share: where a part hangs on another by two edges with an angle between
+/// Where parts that unroll are joined along a part of their border, or a cut is closed from its end, no place is longer or shorter than on the surface by more than this share: where a part hangs on another by two edges with an angle between
 /// them, a few faces around these give way by 5 to 40 per cent, which the mean over a chart hardly tells; a cable that winds gently is stretched by
 /// less everywhere.
 const UNROLLED_PLACE: f64 = 0.04;
@@ -185,7 +185,9 @@ impl Price {
     pub(super) fn is_worth(&self, old: &[&Chart], new: &[Chart]) -> bool {
         if !self.may_bend && is_kept_unrolled(old) {
             let most = old.iter().map(|chart| worst_place(chart)).fold(UNROLLED_PLACE, f64::max);
-            if !new.iter().all(|chart| unrolls(chart) && worst_place(chart) <= most) {
+            let is_exact = self.is_exact || old.len() == 1;
+            let is_bent = |chart: &Chart| is_exact && worst_place(chart) > most;
+            if new.iter().any(|chart| !unrolls(chart) || is_bent(chart)) {
                 return false;
             }
         }
@@ -312,7 +314,7 @@ mod tests {
         let mesh = test_surfaces::grid(24, 16, [24.0, 16.0], 0.0);
         let (_, halves) = strips(&mesh, 24.0, 2);
         let (_, whole) = strips(&mesh, 24.0, 1);
-        let price = price(&mesh, 20.0);
+        let price = price(&mesh, 20.0).exact();
         let old: Vec<&Chart> = halves.iter().collect();
         let moved = |by: f64| {
             let mut chart = whole[0].clone();
@@ -326,6 +328,7 @@ mod tests {
         let bent = moved(0.15);
         assert!(bent.l2 < UNROLLED, "{}: the mean does not tell", bent.l2);
         assert!(!price.is_worth(&old, std::slice::from_ref(&bent)));
+        assert!(Price { is_exact: false, ..price }.is_worth(&old, std::slice::from_ref(&bent)));
         // What is bent already may be joined to what is not.
         assert!(worst_place(&bent) > UNROLLED_PLACE && price.is_worth(&[&bent, &bent], &[bent.clone()]));
     }
