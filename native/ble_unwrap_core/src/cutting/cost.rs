@@ -330,7 +330,7 @@ mod tests {
         assert!(!price.is_worth(&old, std::slice::from_ref(&bent)));
         assert!(Price { is_exact: false, ..price }.is_worth(&old, std::slice::from_ref(&bent)));
         // What is bent already may be joined to what is not.
-        assert!(worst_place(&bent) > UNROLLED_PLACE && price.is_worth(&[&bent, &bent], &[bent.clone()]));
+        assert!(worst_place(&bent) > UNROLLED_PLACE && price.is_worth(&[&bent, &bent], std::slice::from_ref(&bent)));
     }
 
     #[test]
