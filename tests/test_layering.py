@@ -205,7 +205,7 @@ def test_core_layers():
 
 # From a surface to charts: a file, or a folder as a whole, uses those of the rows above its own.
 CUTTING = [
-    {"charted", "rigid_motion", "measured"},
+    {"charted", "rigid_motion", "measured", "merged"},
     {"state", "edit", "cost"},
     {"border", "history", "copied", "touch_up"},
     {"moves/mod"},

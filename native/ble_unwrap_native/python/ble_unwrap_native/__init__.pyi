@@ -72,7 +72,7 @@ class _ChartsGroup(TypedDict, total=False):
     symmetry: Literal["auto", "off"]
     """Whether seams of mirrored surfaces are mirrored, too. "auto": Where a piece has a mirror plane along edges, so have its seams. "off": Seams are found without regard to mirror planes."""
     stack: Literal["off", "equal", "mirrored"]
-    """Which charts lie on each other, so that like parts share their pixels and all charts get more of them. "off": Every chart has a place of its own. "equal": Charts of equal parts lie exactly on each other and share their pixels. "mirrored": Charts of mirrored parts and mirrored halves do so, too; there, the texture is mirrored on the surface."""
+    """Which charts lie on each other, so that like parts share their pixels and all charts get more of them. Nothing is copied, and so nothing stacked, under a limit over the atlas or with fewer moves. "off": Every chart has a place of its own. "equal": Charts of equal parts lie exactly on each other and share their pixels. "mirrored": Charts of mirrored parts and mirrored halves do so, too; there, the texture is mirrored on the surface."""
     style: Literal["auto", "organic", "hard"]
     """Whether planes, cylinders and the like between hard edges keep their shape. "auto": Parts between hard edges that can lie flat without stretch do so if most of a connected piece is made of them, and so do planes and walls between bevels; else only large planes do. "organic": Hard edges are not treated specially. "hard": All parts between hard edges lie flat without stretch, but for thin rings that become strips, whatever the piece is made of; edges count as hard from 40° instead of 50°."""
     straighten: float
@@ -170,7 +170,7 @@ class _TilesGroup(TypedDict, total=False):
 @type_check_only
 class _PackingGroup(TypedDict, total=False):
     rotation: Literal["aligned", "any", "quarter", "none"]
-    """How charts may be turned when they are packed. "aligned": Charts with straight borders lie along the axes, symmetric ones upright or level, others at any angle. "any": Charts are turned by any angle, which packs tightest. "quarter": Charts are turned by multiples of 90° from how they were flattened, not set upright. "none": Charts stay as they were flattened, at whatever angle that is."""
+    """How charts may be turned when they are packed. "aligned": Charts with straight borders lie along the axes, symmetric ones upright or level, others at any angle. "any": Charts are turned by any angle, which packs tightest. "quarter": Charts are turned by multiples of 90° from how they were flattened, none set upright by itself. "none": Charts stay as they were flattened, at whatever angle that is."""
     quality: Literal["fast", "normal", "high"]
     """How long a dense placement of the charts is searched for. "fast": A fraction of a second for up to some hundred charts. "normal": Up to twice as long; charts turned by any angle are tried at more angles. "high": Ten to twenty times as long, on finer grids."""
 
@@ -257,6 +257,8 @@ class _PackSettings(_CallSettings, _TextureGroup, _TilesGroup, _PackingGroup, _D
 
 @final
 class Analysis:
+    @property
+    def cut_angle(self) -> float | None: ...
     @property
     def weld(self) -> bool: ...
     @property
