@@ -202,7 +202,8 @@ fn across_originals(
     rungs: &mut Rungs,
     run: &Run<'_>,
 ) -> Result<(), Cancelled> {
-    let mut component_of = vec![usize::MAX; mesh.face_count()];
+    // Each face is in one.
+    let mut component_of = vec![0; mesh.face_count()];
     for (component, faces) in (0..components.len()).map(|c| (c, components.group(c))) {
         faces.iter().for_each(|f| component_of[f.index()] = component);
     }
