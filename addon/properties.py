@@ -208,6 +208,7 @@ class BLEUnwrapSettings(bpy.types.PropertyGroup):
     symmetry: declared("symmetry")
     style: declared("style")
     straighten: declared("straighten", soft_max=1.0, step=5, precision=2)
+    cover_price: declared("cover_price", soft_max=10.0, step=50, precision=2)
     moves: declared("moves")
     holes: declared("holes")
     chart_scale: declared("chart_scale")
@@ -274,7 +275,7 @@ ADVANCED_SETTINGS = (
     ("Distances", ("geodesics", "landmark_fraction", "landmark_min", "landmark_max", "together_max")),
     ("Embedding", ("model", "kernel_width", "relaxation", "max_sweeps", "tolerance", "update", "initial")),
     ("Stretch", ("stretch_solver", "stretch_iterations")),
-    ("Packing", ("stack", "quality", "mip_levels", "shrink_margin", "snap", "tiles", "texel_density")),
+    ("Packing", ("cover_price", "stack", "quality", "mip_levels", "shrink_margin", "snap", "tiles", "texel_density")),
 )
 
 

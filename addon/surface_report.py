@@ -81,6 +81,7 @@ def found(report):
         "mirrored": lambda count: f"{counted(count, 'mirrored piece')}: seams on one half are those of the other",
         "copied": lambda count: f"{counted(count, 'piece')} with the map of another one like them",
         "straighten": lambda count: f"{counted(count, 'chart')} with sides laid along the axes",
+        "fold": lambda count: f"{counted(count, 'cut')} so that more of the texture is covered",
     }
     lines = [text(rungs[name]) for name, text in said.items() if rungs.get(name)]
     if snapped := report.get("snapped_charts"):

@@ -127,7 +127,7 @@ def test_minimise_off_and_presets():
 def flatten_settings(preset):
     """The settings of a preset that `flatten` takes."""
     unwraps = {"stretch_limit", "limit_over", "coarse", "moves", "stretch_price", "holes", "chart_scale"}
-    unwraps |= {"hide_seams", "front", "symmetry", "stack", "style", "straighten"}
+    unwraps |= {"hide_seams", "front", "symmetry", "stack", "style", "straighten", "cover_price"}
     unwraps |= {"crease_weight", "margin", "texture_size", "rotation", "quality", "tiles", "texel_density"}
     unwraps |= {"cut_angle", "mip_levels", "snap", "shrink_margin"}
     return {name: value for name, value in native.default_settings(preset).items() if name not in unwraps}

@@ -191,10 +191,11 @@ def test_one_is_singular(addon):
 def test_what_was_found_is_said(addon):
     report = addon("surface_report")
     assert report.found({"rungs": {"plane": 2}}) == report.found({}) == []
-    assert report.found({"rungs": {"mirrored": 1, "copied": 3, "straighten": 2}}) == [
+    assert report.found({"rungs": {"mirrored": 1, "copied": 3, "straighten": 2, "fold": 1}}) == [
         "1 mirrored piece: seams on one half are those of the other",
         "3 pieces with the map of another one like them",
         "2 charts with sides laid along the axes",
+        "1 cut so that more of the texture is covered",
     ]
     bpy.ops.mesh.primitive_monkey_add()
     unwrap()

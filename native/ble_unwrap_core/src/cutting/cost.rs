@@ -9,8 +9,8 @@
 //! falls. The limit is no part of the cost: what is over it is no chart. To measure a weight again, change it and run `make quality` before and after.
 //!
 //! Three things that the sum does not see are weighed against seam by themselves, after the search: the worst stretch of a place
-//! ([`lowers_peak`]), how much of a texture can be filled ([`fill_asks_for_a_cut`], [`fills_better`]), and whether borders are straight
-//! ([`Price::is_worth_straightening`]).
+//! ([`lowers_peak`]), how much of a texture can be filled ([`fill_asks_for_a_cut`], [`fills_better`]) and is covered ([`value_of_cover`]), and whether borders
+//! are straight ([`Price::is_worth_straightening`]).
 
 use std::sync::Arc;
 
@@ -61,6 +61,13 @@ const GOOD_FILL: f64 = 0.6;
 /// A cut across is worth its seam if a texture that holds the parts needs at most this share of the length of one that holds the chart.
 /// A cut in the middle of a strip comes to 0.5 to 0.6.
 const LEAST_GAIN: f64 = 0.9;
+
+/// A texture of which this share is covered is full enough: few layouts of one to three organic charts cover more.
+const WELL_COVERED: f64 = 0.7;
+/// A chart that fills this share of the smallest box around it lies well beside others.
+const FILLS_ITS_BOX: f64 = 0.8;
+/// A cut that lets charts be folded covers at least so much more of the texture: less is lost or won by chance when charts are packed.
+const LEAST_COVER_GAINED: f64 = 0.06;
 
 /// A mesh on which seams are the dearer the more they can be seen, by the power [`Settings::hide_seams`] of the visibility: each component by
 /// itself, so that in the mean over its surface a border counts for its length, times what it counted for before.
@@ -299,6 +306,23 @@ pub(super) fn fills_better(whole: f64, mut parts: impl Iterator<Item = f64>) -> 
     parts.all(|part| part <= LEAST_GAIN * whole)
 }
 
+/// Whether so little of a texture is covered that charts may be cut to be folded.
+pub(super) fn is_ill_covered(covered: f64) -> bool {
+    covered < WELL_COVERED
+}
+
+/// Whether a chart that fills some share of the smallest box around it may be cut to be folded: what unrolls keeps its shape, and a rectangle is to stay one.
+pub(super) fn may_be_folded(chart: &Chart, box_filled: f64) -> bool {
+    !unrolls(chart) && box_filled < FILLS_ITS_BOX
+}
+
+/// What a cut is worth that makes seams longer by some share of all, and lets so much more of the texture be covered, as a share of the texture; `None` where
+/// it is worth nothing, or too little to tell.
+pub(super) fn value_of_cover(added_share: f64, gained: f64, settings: &Settings) -> Option<f64> {
+    let value = settings.cover_price * gained - added_share;
+    (gained >= LEAST_COVER_GAINED && value > 0.0).then_some(value)
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::state::tests::strips;
@@ -532,6 +556,23 @@ mod tests {
         );
         assert!(fills_better(10.0, [5.0, 6.0].into_iter()), "a strip cut in the middle");
         assert!(!fills_better(10.0, [5.0, 9.5].into_iter()), "the longest part counts");
+    }
+
+    #[test]
+    fn a_texture_that_is_covered_better_is_worth_seam_in_proportion() {
+        let by = |cover_price: f64| Settings { cover_price, ..Settings::default() };
+        assert!(value_of_cover(0.24, 0.1, &by(2.5)).is_some() && value_of_cover(0.26, 0.1, &by(2.5)).is_none());
+        assert!(value_of_cover(0.24, 0.1, &by(2.3)).is_none() && value_of_cover(0.0, 0.1, &by(0.0)).is_none());
+        assert!(value_of_cover(0.01, 0.05, &by(2.5)).is_none(), "packing differs by as much from one try to the next");
+        // Without any seam nothing is a share of it.
+        assert!(
+            value_of_cover(f64::INFINITY, 0.5, &by(2.5)).is_none() && value_of_cover(f64::NAN, 0.5, &by(2.5)).is_none()
+        );
+        let mesh = test_surfaces::grid(6, 4, [6.0, 4.0], 0.0);
+        let flat = strips(&mesh, 6.0, 1).1[0].clone();
+        let bent = Chart { l2: 1.02, ..flat.clone() };
+        assert!(may_be_folded(&bent, 0.5) && !may_be_folded(&bent, 0.9) && !may_be_folded(&flat, 0.5));
+        assert!(is_ill_covered(0.5) && !is_ill_covered(0.8));
     }
 
     #[test]

@@ -25,6 +25,11 @@ impl Merged {
         Self { whole: Patch::whole(Arc::new(mesh), polygon), order }
     }
 
+    /// The face of the patch that a face of the whole is; its corners come in the same order.
+    pub(super) fn face(&self, f: FaceId) -> FaceId {
+        self.order[f.index()]
+    }
+
     /// A chart of the whole as a chart of the patch that it was made of. O(n log n).
     pub(super) fn chart_of(&self, patch: &Patch, chart: &Chart) -> Chart {
         // The patch's face, and the chart's.

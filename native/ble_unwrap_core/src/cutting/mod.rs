@@ -15,6 +15,7 @@ mod copied;
 mod cost;
 mod divide;
 mod edit;
+mod folded;
 mod history;
 mod level;
 mod measured;
@@ -47,10 +48,12 @@ use crate::settings::{ChartScale, LimitOver, Moves, Settings, Stack, Style};
 use alike::{Alike, Placed, alike};
 use atlas_limit::join_within_atlas;
 use charted::Charted;
+use folded::{Components, folded};
 use moves::across::cut_across;
 
 pub(crate) use cost::Price;
 pub(crate) use divide::divide;
+pub(crate) use moves::fold::Cover;
 pub(crate) use originals::{Described, Originals};
 pub(crate) use touch_up::touch_up;
 
@@ -60,7 +63,7 @@ type Made = (Vec<Chart>, Rungs);
 /// Cuts a surface into charts under the stretch limit of `settings`, sorted by lowest face. `components` holds the
 /// faces of each connected piece, ascending, `positions` says where the vertices of different pieces are beside each
 /// other, in units of the mesh, and `visibility` how far each vertex can be seen, where that matters. Where charts are
-/// to be stacked, tells what is a copy of what, too.
+/// to be stacked, tells what is a copy of what, too. `cover` tells how much of the texture some charts cover, where that is asked.
 ///
 /// # Errors
 /// The caller cancelled, or there is not enough memory.
@@ -69,6 +72,7 @@ pub(crate) fn cut(
     components: &Groups<FaceId>,
     positions: &[Point3<f64>],
     visibility: Option<&[f32]>,
+    cover: &Cover<'_>,
     settings: &Settings,
     run: &Run<'_>,
 ) -> Result<(Vec<Chart>, Rungs, Originals), Cancelled> {
@@ -140,6 +144,8 @@ pub(crate) fn cut(
     } else {
         Originals::default()
     };
+    let is_by_halves = |made: &Option<Arc<Made>>| made.as_ref().is_some_and(|made| made.1.has(Rung::Mirrored));
+    let by_halves: Vec<bool> = made.iter().map(is_by_halves).collect();
     let mut charts = Vec::new();
     for component in made.into_iter().flatten() {
         rungs.add(&component.1);
@@ -158,6 +164,10 @@ pub(crate) fn cut(
         charts.sort_by_key(|chart| chart.patch.faces.iter().min().copied());
     } else if settings.moves == Moves::All {
         charts = cut_across(mesh, polygon, charts, settings, &mut rungs, run)?;
+        if folded::is_wanted(settings) {
+            let components = Components { faces: components, likes: &likes, by_halves: &by_halves };
+            charts = folded(mesh, polygon, &components, &patch_of, charts, cover, settings, &mut rungs, run)?;
+        }
     }
     Ok((charts, rungs, originals))
 }

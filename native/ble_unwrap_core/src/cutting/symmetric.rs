@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::cache::Run;
 use crate::charts::{Chart, Patch};
 use crate::flattening::{Rung, Rungs};
-use crate::mesh::{self, FaceId, Mirror};
+use crate::mesh::{self, FaceId, HalfedgeId, Mirror};
 use crate::progress::Cancelled;
 use crate::settings::{LimitOver, Moves, Settings, Symmetry};
 
@@ -73,6 +73,22 @@ fn look_for_mirror(patch: &Patch, run: &Run<'_>) -> Result<Option<Mirrored>, Can
     let merged = Merged::new(patch, &label);
     let mirror = mesh::mirror(&merged.whole.mesh, &merged.whole.polygon, run.progress)?;
     Ok(mirror.map(|mirror| Mirrored { mirror, merged: Some(merged) }))
+}
+
+/// For each face of a patch that was charted by halves the mirror images of its sides; none for sides that have none, which are never cut. `None` where the
+/// patch has no mirror plane.
+pub(super) fn images(patch: &Patch, run: &Run<'_>) -> Result<Option<Vec<[HalfedgeId; 3]>>, Cancelled> {
+    let Some(Mirrored { mirror, merged }) = look_for_mirror(patch, run)? else { return Ok(None) };
+    let image = |h: HalfedgeId| mirror.likeness.image(h);
+    let Some(merged) = merged else {
+        return Ok(Some(patch.mesh.faces().map(|f| f.halfedges().map(image)).collect()));
+    };
+    let mut images = vec![[HalfedgeId::NONE; 3]; patch.mesh.face_count()];
+    for f in merged.whole.mesh.faces() {
+        let of_patch = |h: HalfedgeId| if h.is_none() { h } else { merged.face(h.face()).halfedge(h.slot()) };
+        images[merged.face(f).index()] = f.halfedges().map(|h| of_patch(image(h)));
+    }
+    Ok(Some(images))
 }
 
 /// How the half of a patch is charted, given with the names of its faces.

@@ -1,5 +1,5 @@
 //! Charts touched up after the search, and again where some had to be made anew: quads bent in the plane are made convex again, triangles stretched far more than
-//! the others are relaxed, and sides that are straight on the surface are laid along the axes.
+//! the others are relaxed, grids of quads are laid out as rectangles, and sides that are straight on the surface along the axes.
 
 use std::sync::Arc;
 
@@ -19,6 +19,8 @@ use super::cost::{self, Price};
 
 /// The L2 stretch of a chart may rise by so much for its L-infinity stretch to fall.
 const MOST_RISE: f64 = 1e-3;
+/// A plane that is so many times as long as wide, and curved, is a ribbon, as a road is; any other keeps its shape.
+const RIBBON: f64 = 4.0;
 
 /// The charts with their quads convex wherever they are so on the surface and that can be had, and, but in the paper's presets,
 /// with less L-infinity stretch and straight sides, where that is worth it by `price`; all others stay as they are.
@@ -84,12 +86,24 @@ fn touched_up(
             rungs.take(Rung::Relax);
         }
     }
-    // A plane keeps its shape.
-    if settings.moves == Moves::All && settings.straighten > 0.0 && embedding::plane(&mesh).is_none() {
+    if settings.moves == Moves::All && settings.straighten > 0.0 {
+        let is_plane = embedding::plane(&mesh).is_some();
         let is_worth = |uv: &[Point2<f64>], gained: f64| {
             let l2 = flattening::l2(&chart.patch, &rest, uv);
             l2 <= limit.min(first + rise) && price.is_worth_straightening(&chart, l2, gained)
         };
+        let gained = || mesh.boundary_length() - stretch::aligned_length(&mesh, &chart.uv);
+        let laid = stretch::rectangle(&mesh, &chart.patch.polygon)
+            .filter(|found| (!is_plane || found.slenderness >= RIBBON) && is_worth(&found.uv, gained()));
+        if let Some(found) = laid {
+            chart.l2 = flattening::l2(&chart.patch, &rest, &found.uv);
+            chart.uv = found.uv;
+            rungs.take(Rung::Straighten);
+            return Ok((chart, rungs));
+        }
+        if is_plane {
+            return Ok((chart, rungs));
+        }
         let (uv, settings) = (&chart.uv, &settings.stretch);
         let straight = stretch::straighten_sides(&mesh, &rest, &quads, uv, &is_worth, settings, progress);
         if let Some(uv) = or_nothing(straight)? {

@@ -89,7 +89,7 @@ fn drawn(cutting: &Cutting<'_>, patch: &Patch, moved: Option<(ChartId, Motion)>)
 }
 
 /// Where the vertices of a patch lie, of which some faces, in ascending order, are drawn anew.
-fn positions(cutting: &Cutting<'_>, patch: &Patch, anew: &[(FaceId, Corners)]) -> Positions {
+pub(super) fn positions(cutting: &Cutting<'_>, patch: &Patch, anew: &[(FaceId, Corners)]) -> Positions {
     let mut uv = vec![Point2::origin(); patch.mesh.vertex_count()];
     let redrawn = |f: &FaceId| anew.binary_search_by_key(f, |d| d.0).ok().map(|at| anew[at].1);
     let mut put = |is_anew: bool| {

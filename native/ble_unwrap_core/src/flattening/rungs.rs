@@ -49,10 +49,12 @@ pub(crate) enum Rung {
     Relax,
     /// Sides that are straight on the surface were laid along the axes.
     Straighten,
+    /// A chart was opened so that its parts cover more of the texture.
+    Fold,
 }
 
 impl Rung {
-    const ALL: [Self; 23] = [
+    const ALL: [Self; 24] = [
         Self::Plane,
         Self::Unfold,
         Self::Projection,
@@ -76,6 +78,7 @@ impl Rung {
         Self::Unbend,
         Self::Relax,
         Self::Straighten,
+        Self::Fold,
     ];
 
     /// A short name for reports.
@@ -105,6 +108,7 @@ impl Rung {
             Self::Unbend => "unbend",
             Self::Relax => "relax",
             Self::Straighten => "straighten",
+            Self::Fold => "fold",
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Charts to atlas: scale, pack, round, check, and mend what the checks find.
 
+mod cover;
 mod mend;
 mod narrow;
 mod placed;
@@ -24,6 +25,7 @@ use crate::progress::Stage;
 use crate::settings::Settings;
 use crate::verify::{self, Certificate};
 
+pub(crate) use cover::cover;
 use mend::Faults;
 use placed::Placed;
 use stacks::Stacks;

@@ -148,13 +148,21 @@ fn exceeds(chart: &Chart, uv: &[Point2<f64>], size: [f64; 2], limit: f64) -> boo
     chart.l2 <= limit && l2 > limit * (1.0 - 1e-6)
 }
 
+/// The triangles of each chart, as packing takes them.
+pub(super) fn triangles(charts: &[&Chart]) -> Vec<Vec<[u32; 3]>> {
+    let index = |v: VertexId| u32::try_from(v.index()).unwrap_or(u32::MAX);
+    charts.iter().map(|c| c.patch.mesh.triangles().iter().map(|t| t.map(index)).collect()).collect()
+}
+
+/// What is to be packed, of charts and their [`triangles`].
+pub(super) fn items<'a>(charts: &[&'a Chart], triangles: &'a [Vec<[u32; 3]>]) -> Vec<PackItem<'a>> {
+    charts.iter().zip(triangles).map(|(c, t)| PackItem { points: &c.uv, triangles: t }).collect()
+}
+
 /// Packs charts whose unit is `unit` units of the input, in which densities are given and told.
 fn pack(charts: &[&Chart], unit: f64, packing: &PackSettings, progress: &Progress) -> Result<Packed, UnwrapError> {
-    let index = |v: VertexId| u32::try_from(v.index()).unwrap_or(u32::MAX);
-    let triangles: Vec<Vec<[u32; 3]>> =
-        charts.iter().map(|c| c.patch.mesh.triangles().iter().map(|t| t.map(index)).collect()).collect();
-    let items: Vec<PackItem<'_>> =
-        charts.iter().zip(&triangles).map(|(c, t)| PackItem { points: &c.uv, triangles: t }).collect();
+    let triangles = triangles(charts);
+    let items = items(charts, &triangles);
     // A surface has unit area, so that what is out of range here fits into no texture, or is specks in any.
     let in_unit = |density: f64| (density * unit).clamp(f64::MIN_POSITIVE, PackSettings::GREATEST_DENSITY);
     let scaled = PackSettings { texel_density: packing.texel_density.map(in_unit), ..packing.clone() };

@@ -24,7 +24,7 @@ const LARGE: usize = 24;
 /// 0.4 % and 0.1 %.
 const ANGLES: [usize; 3] = [48, 6, 12];
 /// The same for [`Quality::Fast`].
-const FEW_ANGLES: [usize; 3] = [24, 3, 8];
+pub(super) const FEW_ANGLES: [usize; 3] = [24, 3, 8];
 /// Share of the texture charts cover in the first guess, with half a margin around each.
 const FIRST_FILL: f64 = 0.8;
 /// A search climbs from where it begins, and may end on a hill: each is made from so many densities, relative to the first
@@ -281,7 +281,7 @@ pub(super) fn thinned(
 }
 
 /// Base angles to try, by chart; `areas` tell which are large.
-fn turns(
+pub(super) fn turns(
     outlines: &[Outline],
     areas: &[f64],
     [all, least, most]: [usize; 3],
@@ -309,7 +309,7 @@ fn turns(
 
 /// Density at which squares of the charts' areas, with margin and raster waste added, cover
 /// [`FIRST_FILL`] of the share `room` of the texture.
-fn first_guess(areas: impl Iterator<Item = f64>, room: f64, settings: &PackSettings, grid: Grid) -> f64 {
+pub(super) fn first_guess(areas: impl Iterator<Item = f64>, room: f64, settings: &PackSettings, grid: Grid) -> f64 {
     let gap = settings.margin_texels + grid.cell + 2.0 * SAFETY_TEXELS;
     let (mut a, mut b, mut c) = (0.0, 0.0, -FIRST_FILL * f64::from(settings.width) * f64::from(settings.height) * room);
     for area in areas {

@@ -28,7 +28,8 @@
 //! 9. `density` is the whole of it for one texture; `alone` a single chart, where there is nothing to search.
 //! 10. `spread`, for several tiles or a density that is given: which chart goes into which tile, each of which is packed by 1 to 9.
 //!     `tile` says where tiles lie, `shortfall` what the user is told of a density that does not fit.
-//! 11. `snap`: at last rectangles are laid on whole texels, where that is asked for.
+//! 11. `rough` tells about how much will be covered, for a fraction of the cost.
+//! 12. `snap`: at last rectangles are laid on whole texels, where that is asked for.
 //!
 //! `constraints` are what a caller may ask for in addition. `obstacles` are cells that are occupied from the start, by the same raster
 //! and the same distance between cells, so that the guarantee holds for them as it does between charts. `mip_margin`
@@ -61,6 +62,7 @@ mod placement;
 mod pose;
 mod raster;
 mod refine;
+mod rough;
 mod search;
 mod settle;
 mod shape;
@@ -89,6 +91,7 @@ pub(crate) use constraints::Constraints;
 pub(crate) use outline::LARGEST;
 use outline::Outline;
 use placement::Place;
+pub(crate) use rough::rough_cover;
 pub(crate) use shortfall::Shortfall;
 pub(crate) use shrink::told as told_of_margin;
 use snap::Snapped;

@@ -288,6 +288,11 @@ pub struct Settings {
     /// length costs as seam. On the same condition thin rings, such as the rim of a hoop, are opened and become strips. Has an effect only with all
     /// `moves`, and none where `stretch_price` is 0.
     pub straighten: f64,
+    /// How much longer seams may get for a texture that is covered better: by so many times the share of the texture that is covered besides, as a share
+    /// of all seam. Where one or two charts leave much of it empty, they are cut where they are narrow, little is seen and the parts then lie closer
+    /// together. Has an effect only with all `moves`, on one tile, without a given density and without stacks, and none where
+    /// `stretch_price` is 0. Of the texture, only its proportions matter.
+    pub cover_price: f64,
     /// What happens to the holes of charts.
     pub holes: Holes,
     /// How charts are scaled relative to each other.
@@ -328,6 +333,7 @@ impl Default for Settings {
             stack: Stack::Off,
             style: Style::Auto,
             straighten: 0.25,
+            cover_price: 2.5,
             holes: Holes::Keep,
             chart_scale: ChartScale::Uniform,
             together_max: 0,
@@ -359,6 +365,7 @@ impl Settings {
             symmetry: Symmetry::Off,
             style: Style::Organic,
             straighten: 0.0,
+            cover_price: 0.0,
             segmentation: SegmentationSettings::paper(),
             together_max: PAPER_TOGETHER_MAX,
             geodesics: GeodesicSettings::paper(),

@@ -413,6 +413,9 @@ pub static TABLE: &[Setting] = &[
     row("straighten", "Straighten", Group::Charts, Kind::Real(|s| &mut s.straighten, Interval::closed(0.0, 10.0)), "",
         "How much seam a straight side along an axis of the texture is worth. Sides of charts that are straight on the surface are made \
          straight, and thin rings become strips, where that costs less in stretch; 0 leaves them as they are."),
+    row("cover_price", "Cut to Fill", Group::Charts, Kind::Real(|s| &mut s.cover_price, Interval::closed(0.0, 100.0)), "",
+        "How much longer seams may get for a texture that is covered better: one or two charts that leave much of it empty are cut where their parts then lie closer \
+         together, if that makes all seams longer by at most so many per cent for each per cent of the texture; 0 cuts none for it."),
     row("moves", "Moves", Group::Charts, Kind::Choice(|s| &mut s.moves), "",
         "What the search for charts may do."),
     row("holes", "Holes", Group::Charts, Kind::Choice(|s| &mut s.holes), "",

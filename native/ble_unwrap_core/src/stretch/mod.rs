@@ -34,6 +34,7 @@ mod other_halves;
 mod overlap;
 mod part_boundary;
 mod peaks;
+mod rectangle;
 mod sides;
 mod stitch;
 mod straighten_sides;
@@ -54,8 +55,9 @@ pub(crate) use measure::{l2_of_positions, l2_stretch, l2_unsigned, linf_stretch,
 pub(crate) use overlap::{boundary_is_simple, first_flip};
 pub(crate) use part_boundary::{boundary_is_tangled, part_boundary};
 pub(crate) use peaks::lower_peaks;
+pub(crate) use rectangle::rectangle;
 pub(crate) use stitch::Stitcher;
-pub(crate) use straighten_sides::straighten_sides;
+pub(crate) use straighten_sides::{aligned_length, straighten_sides};
 pub(crate) use tutte::{TutteBoundary, tutte_embedding};
 pub(crate) use unbend::unbend;
 

@@ -86,6 +86,15 @@ pub(crate) fn straighten_sides(
     Ok(is_good.then_some(relaxed))
 }
 
+/// How much of the border of a map lies along the axes at its best turn, by its length on the surface. O(n).
+#[must_use]
+pub(crate) fn aligned_length(mesh: &TriMesh, uv: &[Point2<f64>]) -> f64 {
+    let pose = pose(mesh, uv, sides(mesh, uv));
+    let [c, s] = pose.turn;
+    let turned: Vec<_> = uv.iter().map(|p| Point2::new(c * p.x - s * p.y, s * p.x + c * p.y)).collect();
+    Alignment::new(mesh, &pose.sides).aligned_length(mesh, &turned, ALONG)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -81,7 +81,7 @@ fn self_border(chart: &Chart) -> f64 {
 }
 
 /// By how much a texture of this width and height must be enlarged to hold points, turned as suits them best.
-fn hold(uv: &[Point2<f64>], [width, height]: [f64; 2]) -> f64 {
+pub(super) fn hold(uv: &[Point2<f64>], [width, height]: [f64; 2]) -> f64 {
     directions()
         .map(|along| {
             let across = Vector2::new(-along.y, along.x);
@@ -99,11 +99,11 @@ fn axis(uv: &[Point2<f64>]) -> Vector2<f64> {
     directions().fold((f64::INFINITY, Vector2::x()), narrower).1
 }
 
-fn directions() -> impl Iterator<Item = Vector2<f64>> {
+pub(super) fn directions() -> impl Iterator<Item = Vector2<f64>> {
     (0..DIRECTIONS).map(|k| PI * k as f64 / DIRECTIONS as f64).map(|angle| Vector2::new(angle.cos(), angle.sin()))
 }
 
-fn extent(uv: &[Point2<f64>], along: Vector2<f64>) -> f64 {
+pub(super) fn extent(uv: &[Point2<f64>], along: Vector2<f64>) -> f64 {
     let (low, high) = range(uv, along);
     high - low
 }

@@ -1,12 +1,14 @@
 //! What may be changed about a cutting. A move looks at the cutting and proposes edits; it flattens nothing itself.
 //!
 //! Moves on a patch that has no map to the plane yet say where to cut it: [`split`], [`dart`], [`net`]. Moves on charts make
-//! fewer or better ones of them: [`join`], [`partial_join`], [`zip`], [`hand_over`], [`across`].
+//! fewer or better ones of them: [`join`], [`partial_join`], [`zip`], [`hand_over`], [`across`], [`fold`].
 
 pub(super) mod across;
 pub(super) mod dart;
+pub(super) mod fold;
 pub(super) mod hand_over;
 pub(super) mod join;
+mod lobe;
 pub(super) mod net;
 pub(super) mod partial_join;
 pub(super) mod split;
