@@ -20,11 +20,19 @@ def draw_entry(self, _context):
     self.layout.operator("uv.ble_unwrap", icon="UV")
 
 
+def draw_pack_entry(self, _context):
+    self.layout.operator_context = "INVOKE_DEFAULT"
+    self.layout.operator("uv.ble_unwrap_pack")
+
+
 def register():
     for name in menu_names():
         getattr(bpy.types, name).append(draw_entry)
+    # Beside Blender's own Pack Islands, which the 3D view's menu has not.
+    bpy.types.IMAGE_MT_uvs.append(draw_pack_entry)
 
 
 def unregister():
+    bpy.types.IMAGE_MT_uvs.remove(draw_pack_entry)
     for name in menu_names():
         getattr(bpy.types, name).remove(draw_entry)

@@ -54,6 +54,9 @@ class _Main:
         row.scale_y = 1.4
         row.operator_context = "INVOKE_DEFAULT"
         row.operator("uv.ble_unwrap", icon="UV")
+        row = layout.row()
+        row.operator_context = "INVOKE_DEFAULT"
+        row.operator("uv.ble_unwrap_pack", text="Pack Only")
         draw_settings(layout, context, ("preset", *properties.MAIN_SETTINGS))
 
 

@@ -251,6 +251,8 @@ SURFACE_SETTINGS = (
     *sorted(settings_table.taken_by("unwrap") - settings_table.taken_by("unwrap_points")),
 )
 CLOUD_SETTINGS = ("neighbours",)
+# What packing islands that are there has in common with an unwrap, in the order in which it is shown.
+PACK_SETTINGS = ("texture_size", "correct_aspect", "margin", "mip_levels", "rotation", "quality", "tiles")
 
 # What the panel shows at once, and what it folds away, by title.
 MAIN_SETTINGS = ("stretch_limit", "texture_size", "margin", "rotation", "use_seams", "use_selection")
@@ -288,8 +290,8 @@ def native_values(settings, left_out):
     return {name: value for name, value in settings.items() if name not in BRIDGE_SETTINGS and name not in left_out}
 
 
-def operator_annotations():
-    """The same settings for an operator.
+def operator_annotations(names=None):
+    """The same settings, or those of these names, for an operator.
 
     They are not remembered from its last run, since the scene keeps them: what a call leaves out comes from the scene
     (interactively) or from the defaults (in a script).
@@ -297,6 +299,7 @@ def operator_annotations():
     return {
         name: deferred.function(**{**deferred.keywords, "options": {"SKIP_SAVE"}})
         for name, deferred in annotations().items()
+        if names is None or name in names
     }
 
 
@@ -313,10 +316,7 @@ def copy_unset(target, source):
 
 def copy_changed(source, target):
     """Gives `target` the values of `source` wherever they differ; the preset first, which brings others."""
-    for name in annotations():
-        value = getattr(source, name)
-        if _plain(name, getattr(target, name)) != _plain(name, value):
-            setattr(target, name, value)
+    copy_named(source, target, annotations())
 
 
 def values(settings):
@@ -330,6 +330,19 @@ def values(settings):
     chosen = PRESET_MAPS.get(settings.preset, {})
     unset = {name: value for name, value in chosen.items() if not settings.is_property_set(name)}
     return found | unset
+
+
+def copy_named(source, target, names):
+    """Gives `target` the values of `source` for these settings, wherever they differ."""
+    for name in names:
+        value = getattr(source, name)
+        if _plain(name, getattr(target, name)) != _plain(name, value):
+            setattr(target, name, value)
+
+
+def plain_values(settings, names):
+    """These settings as plain values."""
+    return {name: _plain(name, getattr(settings, name)) for name in names}
 
 
 def _plain(name, value):

@@ -1,9 +1,9 @@
 """Registers the add-on's modules in order, and takes them back in reverse."""
 
 from . import command, last_result, menu, panel, preferences, properties
-from .operators import select_edges, select_narrow, unwrap
+from .operators import pack, select_edges, select_narrow, unwrap
 
-MODULES = (preferences, properties, last_result, unwrap, select_edges, select_narrow, panel, menu, command)
+MODULES = (preferences, properties, last_result, unwrap, pack, select_edges, select_narrow, panel, menu, command)
 
 
 def register():

@@ -345,6 +345,7 @@ PLAIN_MAY_IMPORT = {
     "measurement.py": {"numpy", ".engine"},
     "certificate.py": set(),
     "wording.py": {"numpy"},
+    "uv_islands.py": {"numpy"},
     "surface_report.py": {"numpy", ".certificate", ".wording"},
     "cloud_report.py": {".certificate", ".wording"},
 }

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use crate::error_kind::ErrorKind;
 use crate::mesh::{self, MeshError, MeshInput, Surface};
-use crate::metrics::{self, LayoutArrays, Measures, Texture, TooManyTriangles};
+use crate::metrics::{self, LayoutArrays, Measures, NONE, Texture, TooManyTriangles, TriangleMeasures};
 use crate::progress::{Cancelled, Progress, Stage};
 use crate::settings::Settings;
 use crate::verify::{Certificate, verify};
@@ -91,6 +91,48 @@ pub struct LayoutMeasures {
     pub bent_quads: usize,
     /// The measures of the triangulated faces. Faces with a vertex that is not finite are left out.
     pub measures: Measures,
+    /// What was found of each face.
+    pub by_face: FaceMeasures,
+}
+
+/// The measures of each face of a UV map.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct FaceMeasures {
+    /// Chart of each face, as [`Measures::per_chart`] has them; -1 for a face without UVs.
+    pub chart: Vec<i32>,
+    /// L2 stretch of each face at the best scale of its chart; NaN where nothing could be measured.
+    pub l2: Vec<f64>,
+    /// The faces of which a triangle is one of [`Measures::flips`], ascending.
+    pub flipped: Vec<usize>,
+    /// The faces of which a triangle is in a pair of [`Measures::overlaps`], ascending. Where that count is incomplete,
+    /// so is this list; of triangles of one stack that are the same it has one.
+    pub overlapping: Vec<usize>,
+}
+
+impl FaceMeasures {
+    /// From what was found of the triangles, each of which is part of a face.
+    fn gathered(faces: usize, face_of: &[usize], triangles: &TriangleMeasures) -> Self {
+        let with = |has: &[bool]| {
+            let mut found: Vec<usize> = (0..face_of.len()).filter(|&t| has[t]).map(|t| face_of[t]).collect();
+            found.sort_unstable();
+            found.dedup();
+            found
+        };
+        let mut chart = vec![-1; faces];
+        let mut sums = vec![[0.0; 2]; faces];
+        for (t, &face) in face_of.iter().enumerate() {
+            if triangles.chart[t] != NONE {
+                chart[face] = triangles.chart[t] as i32;
+            }
+            if !triangles.squared_l2[t].is_nan() {
+                sums[face][0] += triangles.squared_l2[t] * triangles.area[t];
+                sums[face][1] += triangles.area[t];
+            }
+        }
+        let l2 = sums.iter().map(|[energy, area]| (energy / area).sqrt()).collect();
+        Self { chart, l2, flipped: with(&triangles.flipped), overlapping: with(&triangles.overlapping) }
+    }
 }
 
 /// Measures a UV map, whoever made it. `uv` holds one UV for each corner. `chart`, if given, holds one number for each
@@ -127,7 +169,7 @@ pub fn measure_layout(
     let (surface, label) = conditioned(input, uv, chart, stack, settings, progress)?;
     let arrays = LayoutArrays::new(input, &surface);
     let mesh = arrays.uv_mesh(uv, &label, Texture::of(&settings.packing))?.with_stacks(stack);
-    let measures = metrics::measure(&mesh, progress)?;
+    let (measures, triangles) = metrics::measure_each(&mesh, progress)?;
     let faces = input.face_offsets.len().saturating_sub(1);
     let mut mapped = vec![true; faces];
     for &p in &surface.unmapped {
@@ -139,7 +181,9 @@ pub fn measure_layout(
     }
     let bent_quads = metrics::bent_quads(input, uv, |face| mapped[face]).len();
     let unmapped_faces = mapped.iter().filter(|mapped| !**mapped).count();
-    Ok(LayoutMeasures { faces, unmapped_faces, bent_quads, measures })
+    let face_of: Vec<usize> = surface.mesh.faces().map(|f| surface.input_polygon(f)).collect();
+    let by_face = FaceMeasures::gathered(faces, &face_of, &triangles);
+    Ok(LayoutMeasures { faces, unmapped_faces, bent_quads, measures, by_face })
 }
 
 /// Checks a UV map exactly, whoever made it, by the same checks that [`unwrap`](crate::unwrap()) makes before it returns an
