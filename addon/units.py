@@ -2,6 +2,17 @@
 
 import bpy
 
+METERS_OF = {"METRIC": (1.0, "m"), "IMPERIAL": (0.3048, "ft")}
+
+
+def density_text(pixels_per_unit):
+    """Pixels for each unit of length of the scene, by its metres or feet."""
+    units = bpy.context.scene.unit_settings
+    if units.system == "NONE":
+        return f"{pixels_per_unit:.4g} px per unit"
+    meters, name = METERS_OF[units.system]
+    return f"{pixels_per_unit / units.scale_length * meters:.4g} px/{name}"
+
 
 def length_text(length):
     """A length of the scene with its unit, three digits after the point; in a scene without units, a number."""

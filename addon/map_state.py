@@ -1,0 +1,68 @@
+"""What a UV map and its object were when they were looked at, by which one can tell later whether they still are."""
+
+import hashlib
+
+import bmesh
+import bpy
+import numpy as np
+
+from .mesh_arrays import read_array, read_corner_vertices, read_positions
+
+# In edit mode reading UVs takes a second a million corners: above this many it is not tried.
+MOST_EDITED_CORNERS = 200_000
+
+
+def find(name, uid):
+    """The object of this `session_uid` in a scene, whatever its name is by now; None where it is gone."""
+    obj = bpy.data.objects.get(name)
+    if obj is None or obj.session_uid != uid:
+        obj = next((other for other in bpy.data.objects if other.session_uid == uid), None)  # it was renamed
+    return obj if obj is not None and obj.users_scene else None
+
+
+def corner_count(obj):
+    """Face corners of a mesh; 0 where there are only points."""
+    return len(obj.data.loops) if obj.type == "MESH" else 0
+
+
+def read_uv(obj, map_name):
+    """The UVs by corner or point, (n, 2) float32, in either mode; None where there are none or it would take too long.
+
+    Edit mode is not left for it, but a mesh in it is brought up to date.
+    """
+    data = obj.data
+    if obj.type == "MESH" and data.is_editmode:
+        obj.update_from_editmode()
+        faces = bmesh.from_edit_mesh(data).faces
+        layer = bmesh.from_edit_mesh(data).loops.layers.uv.get(map_name)
+        if layer is None or len(data.loops) > MOST_EDITED_CORNERS:
+            return None
+        return np.array([tuple(loop[layer].uv) for face in faces for loop in face.loops], np.float32).reshape(-1, 2)
+    attribute = data.attributes.get(map_name)
+    if attribute is None or attribute.data_type != "FLOAT2":
+        return None
+    return read_array(attribute.data, "vector", np.float32, 2)
+
+
+def uv_digest(obj, map_name):
+    """Digest of the UVs, the same in either mode; None where `read_uv` gives none."""
+    uv = read_uv(obj, map_name)
+    return None if uv is None else _digest(uv)
+
+
+def shape_digest(obj):
+    """Digest of the faces and the shape of a mesh; in edit mode as `uv_digest`, which comes first, has updated it."""
+    return _digest(read_positions(obj.data), read_corner_vertices(obj.data))
+
+
+def scale(obj):
+    """How an object's transform stretches lengths, (3, 3), whatever its place and rotation are."""
+    matrix = np.array(obj.matrix_world.to_3x3(), np.float64)
+    return matrix.T @ matrix
+
+
+def _digest(*arrays):
+    digest = hashlib.blake2b(digest_size=16)
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
