@@ -43,7 +43,7 @@ def lines(measured, faults, *, margin, stretch_limit, length_text, density_text)
         _overlaps(measured, faults["OVERLAPPING"]),
         _fault("FLIPPED", faults, "flipped face", "No flipped faces"),
     ]
-    if measured["uv_degenerate_triangles"] and faults["COLLAPSED"]:
+    if faults["COLLAPSED"]:
         found.append(_fault("COLLAPSED", faults, "face", "", " without area in the map"))
     if faults["UNMAPPED"]:
         found.append(_fault("UNMAPPED", faults, "face", "", " without UVs"))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import check_report, map_state, measurement, mesh_bridge, textures, units, uv_islands
+from .island_choice import part_of_face
 from .mesh_arrays import MeshError
 
 ALL_TILES = 100  # as many as the native module knows: maps of others may use any
@@ -43,8 +44,9 @@ def check(objects, settings, *, threads=0):
     size = settings["texture_size"]
     if settings["correct_aspect"]:
         size, _ = textures.proportioned_size(mapped, maps, size)
-    part = np.repeat(np.arange(len(mapped)), [part.faces.stop - part.faces.start for part in selection.parts])
-    island = uv_islands.islands(selection.positions, selection.corner_vertices, selection.face_offsets, uv, part)
+    _, island = uv_islands.islands(
+        selection.positions, selection.corner_vertices, selection.face_offsets, uv, part_of_face(selection)
+    )
     stack = uv_islands.stacks(island, selection.face_offsets, uv)
     measured = measurement.measure(
         selection,
@@ -57,10 +59,10 @@ def check(objects, settings, *, threads=0):
         by_face=True,
     )
     measured |= {"stacked": int((stack >= 0).sum()), "stacks": int(stack.max(initial=-1)) + 1}
-    areas = _face_areas(selection, uv, size)
-    measured |= _densities(island, *areas)
+    shapes = _Shapes.of(selection, uv, size)
+    measured |= _densities(island, shapes)
     limit = settings["stretch_limit"]
-    faults = _faults(measured, island, stack, areas, limit)
+    faults = _faults(measured, island, stack, shapes, limit)
     return Check(
         objects=mapped,
         maps=maps,
@@ -77,25 +79,44 @@ def check(objects, settings, *, threads=0):
     )
 
 
-def _face_areas(selection, uv, size):
-    """The area of each face on the surface and, without sign, in pixels, two of (f,)."""
-    triangles = selection.corner_triangles
-    if triangles is None:
-        triangles = np.arange(len(uv), dtype=np.int32).reshape(-1, 3)
-    a, b, c = selection.positions.astype(np.float64)[selection.corner_vertices[triangles]].transpose(1, 0, 2)
-    surface = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    a, b, c = (uv.astype(np.float64) * size)[triangles].transpose(1, 0, 2)
-    (ax, ay), (bx, by) = (b - a).T, (c - a).T
-    pixels = 0.5 * np.abs(ax * by - ay * bx)
-    face = np.repeat(np.arange(selection.face_count), np.diff(selection.face_offsets))[triangles[:, 0]]
-    return [np.bincount(face, area, selection.face_count) for area in (surface, pixels)]
+@dataclass
+class _Shapes:
+    """What each triangle of a selection is on the surface and in pixels."""
+
+    face: np.ndarray  # (t,)
+    surface: np.ndarray  # (t,) area
+    pixels: np.ndarray  # (t,) area, without sign
+    longest: np.ndarray  # (t,) most that a line is longer on the surface than in pixels
+    shortest: np.ndarray  # (t,) least
+
+    @classmethod
+    def of(cls, selection, uv, size):
+        triangles = selection.corner_triangles
+        if triangles is None:
+            triangles = np.arange(len(uv), dtype=np.int32).reshape(-1, 3)
+        face = np.repeat(np.arange(selection.face_count), np.diff(selection.face_offsets))[triangles[:, 0]]
+        with np.errstate(all="ignore"):
+            a, b, c = selection.positions.astype(np.float64)[selection.corner_vertices[triangles]].transpose(1, 0, 2)
+            one, other = b - a, c - a
+            surface = 0.5 * np.linalg.norm(np.cross(one, other), axis=1)
+            a, b, c = (uv.astype(np.float64) * size)[triangles].transpose(1, 0, 2)
+            (ax, ay), (bx, by) = (b - a).T, (c - a).T
+            twice = ax * by - ay * bx
+            along_u = (one * by[:, None] - other * ay[:, None]) / twice[:, None]
+            along_v = (other * ax[:, None] - one * bx[:, None]) / twice[:, None]
+            uu, uv_, vv = ((p * q).sum(axis=1) for p, q in ((along_u, along_u), (along_u, along_v), (along_v, along_v)))
+            longest = np.sqrt(0.5 * (uu + vv + np.hypot(uu - vv, 2 * uv_)))
+            pixels = 0.5 * np.abs(twice)
+            shortest = surface / pixels / longest
+        return cls(face, surface, pixels, longest, shortest)
 
 
-def _densities(island, surface, pixels):
+def _densities(island, shapes):
     """Pixels for each unit of length: over all, and of the islands that have least and most."""
     count = int(island.max(initial=-1)) + 1
-    known = (island >= 0) & np.isfinite(surface) & np.isfinite(pixels)
-    sums = [np.bincount(island[known], area[known], count) for area in (surface, pixels)]
+    of = island[shapes.face]
+    known = (of >= 0) & np.isfinite(shapes.surface) & np.isfinite(shapes.pixels)
+    sums = [np.bincount(of[known], area[known], count) for area in (shapes.surface, shapes.pixels)]
     compared = (sums[0] > SPECK * sums[0].sum()) & (sums[0] > 0)
     if not compared.any():
         return {}
@@ -106,23 +127,56 @@ def _densities(island, surface, pixels):
     }
 
 
-def _faults(measured, island, stack, areas, limit):
+def _faults(measured, island, stack, shapes, limit):
     """Kind of fault -> which faces have it, (f,) bool."""
-    surface, _ = areas
-    chart, stretch = np.asarray(measured["face_chart"]), np.asarray(measured["face_l2"])
-    too_much = limit + check_report.STRETCH_SLACK
-    of_charts = np.append(np.array(measured["chart_l2"], np.float64), np.nan)  # the last is for faces without UVs
-    numbered = {}
-    for name in ("overlapping", "flipped"):
-        numbered[name] = np.zeros(len(island), bool)
-        numbered[name][np.asarray(measured[f"{name}_faces"])] = True
-    with np.errstate(invalid="ignore"):
-        stretched = (stretch > too_much) & (of_charts[chart] > too_much)
+
+    def numbered(name):
+        found = np.zeros(len(island), bool)
+        found[np.asarray(measured[name])] = True
+        return found
+
     return {
-        "OVERLAPPING": numbered["overlapping"],
-        "FLIPPED": numbered["flipped"],
-        "STRETCHED": stretched,
-        "COLLAPSED": (chart >= 0) & np.isnan(stretch) & (surface > 0),
-        "UNMAPPED": chart < 0,
-        "STACKED": (island >= 0) & np.append(stack, -1)[island] >= 0 if len(stack) else np.zeros(len(island), bool),
+        "OVERLAPPING": numbered("overlapping_faces"),
+        "FLIPPED": numbered("flipped_faces"),
+        "COLLAPSED": numbered("collapsed_faces"),
+        "STRETCHED": _stretched(measured, shapes, limit),
+        "UNMAPPED": np.asarray(measured["face_chart"]) < 0,
+        "STACKED": (island >= 0) & (np.append(stack, np.int32(-1))[island] >= 0),
     }
+
+
+def _stretched(measured, shapes, limit):
+    """Which faces are drawn out or pressed together most, in islands that are beyond the limit as a whole, (f,) bool.
+
+    What counts is the line of a face that is longest on the surface, or shortest, against the lines of half the island:
+    an island that is drawn out at one place is not at fault everywhere else. Where no line is beyond the limit, lines
+    beyond its root count, of which there are some in each island whose mean is beyond it.
+    """
+    chart = np.asarray(measured["face_chart"])
+    too_much = limit + check_report.STRETCH_SLACK
+    beyond = np.array(measured["chart_l2"], np.float64)
+    beyond = np.append(np.nan_to_num(beyond, nan=0.0) > too_much, False)  # the last is for faces without UVs
+    asked = np.flatnonzero(beyond[chart[shapes.face]] & np.isfinite(shapes.longest) & np.isfinite(shapes.shortest))
+    of = chart[shapes.face[asked]]
+    usual = _medians(np.sqrt(shapes.longest[asked] * shapes.shortest[asked]), shapes.surface[asked], of, len(beyond))
+    off = np.maximum(shapes.longest[asked] / usual[of], usual[of] / shapes.shortest[asked])
+    worst = np.zeros(len(beyond))
+    np.maximum.at(worst, of, off)
+    least = np.where(worst > limit, limit, np.sqrt(limit))
+    found = np.zeros(len(chart), bool)
+    found[shapes.face[asked[off > least[of]]]] = True
+    return found
+
+
+def _medians(values, weights, group, count):
+    """The median of values by weight in each of `count` groups; 1 where there is no value."""
+    order = np.lexsort([values, group])
+    group, sums = group[order], np.cumsum(weights[order])
+    medians = np.ones(count)
+    if len(order):
+        first = np.flatnonzero(np.append(True, group[1:] != group[:-1]))
+        last = np.append(first[1:], len(order)) - 1
+        before = np.where(first > 0, sums[first - 1], 0.0)
+        middle = np.searchsorted(sums, 0.5 * (before + sums[last]))
+        medians[group[first]] = values[order[np.clip(middle, first, last)]]
+    return medians

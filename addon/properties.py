@@ -303,12 +303,13 @@ def operator_annotations(names=None):
     }
 
 
-def copy_unset(target, source):
-    """Gives `target` the values of `source` for every setting that `target` does not have set itself."""
-    explicit = {name for name in annotations() if target.is_property_set(name)}
+def copy_unset(target, source, names=None):
+    """Gives `target` the values of `source` for every setting, or those of `names`, that it does not have set."""
+    names = annotations() if names is None else names
+    explicit = {name for name in names if target.is_property_set(name)}
     # A preset named in the call brings its own values: the scene's must not override them.
     kept = (*BRIDGE_SETTINGS, *KEPT_BY_PRESETS)
-    names = [name for name in annotations() if "preset" not in explicit or name in kept]
+    names = [name for name in names if "preset" not in explicit or name in kept]
     for name in names:
         if name not in explicit and source.is_property_set(name):
             setattr(target, name, getattr(source, name))

@@ -11,7 +11,9 @@ NEIGHBOURS = np.array(list(itertools.product((-1, 0, 1), repeat=2)), np.int64)
 
 
 def islands(positions, corner_vertices, face_offsets, uv, part_of_face):
-    """The island of each face, numbered by lowest face, (f,) int32; -1 where a UV is not finite.
+    """A number for each corner's place, (c,), and the island of each face, (f,) int32; -1 where a UV is not finite.
+
+    Islands are numbered by their lowest face.
 
     Faces of one mesh are of one island where they touch: a corner of each is at the same place, on the surface as in
     the map. Whether both places belong to one vertex does not matter, since files often split vertices at every face.
@@ -19,19 +21,22 @@ def islands(positions, corner_vertices, face_offsets, uv, part_of_face):
     """
     sizes = np.diff(face_offsets)
     if not len(sizes):
-        return np.empty(0, np.int32)
+        return np.empty(0, np.int64), np.empty(0, np.int32)
     mapped = np.logical_and.reduceat(np.isfinite(uv).all(axis=1), face_offsets[:-1])
     face_of_corner = np.repeat(np.arange(len(sizes)), sizes)
     corners = np.flatnonzero(mapped[face_of_corner])
     found = np.full(len(sizes), -1, np.int32)
+    of_corners = np.full(len(face_of_corner), -1, np.int64)
     if not len(corners):
-        return found
+        return of_corners, found
     part = np.zeros((len(positions), 1), np.float32)
     part[corner_vertices] = part_of_face[face_of_corner, None]
     vertex_place, _ = _equal_rows(_bits(np.concatenate([part, positions], axis=1)))
     in_map = _bits(uv[corners]).astype(np.uint64)
-    both = np.stack([vertex_place[corner_vertices[corners]], in_map[:, 0] << np.uint64(32) | in_map[:, 1]], axis=1)
-    place, count = _equal_rows(both)
+    in_map = in_map[:, 0] << np.uint64(32) | in_map[:, 1]
+    on_surface = vertex_place[corner_vertices[corners]].astype(np.uint64)
+    place, count = _equal_rows(np.stack([on_surface, in_map], axis=1))
+    of_corners[corners] = place
     face = face_of_corner[corners]
     first = np.flatnonzero(np.append(True, face[1:] != face[:-1]))
     sizes_here = np.diff(np.append(first, len(face)))
@@ -42,7 +47,7 @@ def islands(positions, corner_vertices, face_offsets, uv, part_of_face):
     rank = np.empty(len(lowest), np.int32)
     rank[np.argsort(lowest)] = np.arange(len(lowest), dtype=np.int32)
     found[faces] = rank[number.reshape(-1)]
-    return found
+    return of_corners, found
 
 
 def _bits(numbers):
@@ -55,7 +60,7 @@ def _equal_rows(rows):
     order = np.lexsort(rows.T)
     ordered = rows[order]
     new = np.append(True, (ordered[1:] != ordered[:-1]).any(axis=1))
-    number = np.empty(len(rows), np.uint64)
+    number = np.empty(len(rows), np.int64)
     number[order] = np.cumsum(new) - 1
     return number, int(new.sum())
 

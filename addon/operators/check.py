@@ -3,6 +3,7 @@
 import bpy
 
 from .. import last_check, map_check, preferences, properties, targets
+from .map_poll import has_map
 from .with_progress import USER_ERRORS, redraw
 
 
@@ -17,13 +18,7 @@ class UV_OT_ble_unwrap_check(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.mode not in {"OBJECT", "EDIT_MESH"}:
-            cls.poll_message_set("Works in Object Mode and in Edit Mode of a mesh")
-            return False
-        if not any(obj.type == "MESH" and obj.data.uv_layers for obj in targets.target_objects(context)):
-            cls.poll_message_set("Select a mesh that has a UV map")
-            return False
-        return True
+        return has_map(cls, context)
 
     def execute(self, context):
         settings = properties.plain_values(context.scene.ble_unwrap, last_check.SETTINGS)

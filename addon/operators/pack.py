@@ -5,6 +5,7 @@ from bpy.props import BoolProperty, EnumProperty
 
 from .. import faces, preferences, properties, targets
 from ..pack_task import PackTask
+from .map_poll import has_map
 from .with_progress import WithProgress, redraw
 
 # The settings that are not those of an unwrap. Blender remembers them from the last run.
@@ -60,18 +61,10 @@ class UV_OT_ble_unwrap_pack(WithProgress, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.mode not in {"OBJECT", "EDIT_MESH"}:
-            cls.poll_message_set("Works in Object Mode and in Edit Mode of a mesh")
-            return False
-        if not any(obj.type == "MESH" and obj.data.uv_layers for obj in targets.target_objects(context)):
-            cls.poll_message_set("Select a mesh that has a UV map")
-            return False
-        return True
+        return has_map(cls, context)
 
     def invoke(self, context, _event):
-        for name in properties.PACK_SETTINGS:
-            if not self.properties.is_property_set(name):
-                setattr(self, name, getattr(context.scene.ble_unwrap, name))
+        properties.copy_unset(self.properties, context.scene.ble_unwrap, properties.PACK_SETTINGS)
         self.from_sidebar = True
         return self.compute(context, in_background=not bpy.app.background)
 

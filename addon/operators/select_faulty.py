@@ -19,7 +19,11 @@ class MESH_OT_ble_unwrap_select_faulty(bpy.types.Operator):
         items=(
             ("OVERLAPPING", "Overlapping", "Faces that share a place of the UV map with another face"),
             ("FLIPPED", "Flipped", "Faces that lie in the UV map the other way round than most of their island"),
-            ("STRETCHED", "Stretched", "Faces beyond the stretch limit, in islands that are beyond it as a whole"),
+            (
+                "STRETCHED",
+                "Stretched",
+                "Faces that are drawn out or pressed together, in islands beyond the limit",
+            ),
             ("COLLAPSED", "Without Area", "Faces that are a line or a point in the UV map, in part at least"),
             ("UNMAPPED", "Without UVs", "Faces with a UV that is not a number"),
             ("STACKED", "Stacked", "Faces of islands that lie exactly on another one"),

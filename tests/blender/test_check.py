@@ -89,17 +89,18 @@ def test_islands_of_different_densities_are_told(shown):
 
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
 def test_flips_and_overlaps_are_found_and_selected(shown, mode):
-    obj = flat_grid()
+    obj = flat_grid(8)
     values = uvs(obj).copy()
-    values[values[:, 0] > 0.6] = values[values[:, 0] > 0.6] * (-1, 1) + (2 * 0.5833333, 0.0)
-    set_uvs(obj, values)  # the right third is folded back over the middle
-    folded = {face for face in range(36) if obj.data.polygons[face].center.x > 0.67}
-    beneath = {face for face in range(36) if 0.33 < obj.data.polygons[face].center.x < 0.67}
+    right = values[:, 0] > 0.625
+    values[right, 0] = 1.25 - values[right, 0]  # the last two columns are folded back over the two before them
+    set_uvs(obj, values)
+    folded = {face.index for face in obj.data.polygons if face.center.x > 0.75}
+    beneath = {face.index for face in obj.data.polygons if 0.5 < face.center.x < 0.75}
     if mode == "EDIT":
         edit(obj, faces=[0])
     check()
-    assert ("BAD", "24 faces overlap", "OVERLAPPING") in shown()
-    assert ("BAD", "12 flipped faces", "FLIPPED") in shown()
+    assert ("BAD", "32 faces overlap", "OVERLAPPING") in shown()
+    assert ("BAD", "16 flipped faces", "FLIPPED") in shown()
     assert obj.mode == mode
     assert select_faulty(kind="FLIPPED") == {"FINISHED"}
     assert obj.mode == "EDIT" and selected_faces(obj) == folded
@@ -127,11 +128,13 @@ def test_overlaps_between_objects_and_outside_of_the_selection_count(shown):
     assert ("BAD", "18 faces overlap", "OVERLAPPING") in shown()
 
 
-def test_too_much_stretch_is_selected_where_it_is(shown):
+@pytest.mark.parametrize("change", [0.2, -0.05])
+def test_too_much_stretch_is_selected_where_it_is(shown, change):
     obj = flat_grid()
     values = uvs(obj).copy()
-    values[values[:, 0] > 0.6, 0] += 0.2  # the column of faces between is drawn out
+    values[values[:, 0] > 0.6, 0] += change  # the column of faces between is drawn out or pressed together
     set_uvs(obj, values)
+    bpy.context.scene.ble_unwrap.stretch_limit = 1.05
     check()
     (line,) = (line for line in shown() if line[1].startswith("Stretch"))
     assert line[0] == "BAD" and line[2] == "STRETCHED"

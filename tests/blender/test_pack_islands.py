@@ -172,7 +172,7 @@ def test_where_all_is_pinned_nothing_is_done():
         layer.pin_ensure()
     layer.pin[0].value = True
     before = uvs(obj).copy()
-    with pytest.raises(RuntimeError, match="Nothing can be packed: 1 island left in place, pinned"):
+    with pytest.raises(RuntimeError, match="Nothing can be moved: 1 island left in place, pinned"):
         pack()
     assert np.array_equal(uvs(obj), before)
 
@@ -274,7 +274,7 @@ def test_an_object_without_a_map_is_left_out_with_a_note(addon):
     obj, bare = rectangles(), cube("Bare")
     select(obj, bare)
     work = task(addon, obj, bare)
-    assert work.write(work.run()).warnings == ["Bare: no UV map, so there was nothing to pack"]
+    assert work.write(work.run()).warnings == ["Bare: no UV map, so there are no islands"]
     assert not bare.data.uv_layers
 
 
@@ -294,16 +294,23 @@ def test_a_job_on_another_thread_gives_the_same_and_can_be_cancelled(addon):
     assert np.array_equal(uvs(many), before)
 
 
-def test_settings_come_from_the_sidebar_and_go_back_to_it():
-    obj = rectangles()
+def test_settings_come_from_the_sidebar_and_go_back_to_it(addon):
+    """By the functions that the operator does it with: without a window, Blender invokes none."""
+    properties = addon("properties")
     scene = bpy.context.scene.ble_unwrap
-    scene.margin = 16
-    pack("INVOKE_DEFAULT")
-    assert box_gap(*(uvs(obj)[quads(obj)[k]] for k in (0, 1))) * 2048 >= 16 - 0.01
-    pack("INVOKE_DEFAULT", margin=9)
-    assert scene.margin == 9
+    scene.margin, scene.rotation, scene.preset = 16, "NONE", "LIGHTMAP"
+    operator = bpy.context.window_manager.operator_properties_last("uv.ble_unwrap_pack")
+    operator.quality = "HIGH"
+    properties.copy_unset(operator, scene, properties.PACK_SETTINGS)
+    assert (operator.margin, operator.rotation, operator.quality) == (16, scene.rotation, "HIGH")
+    assert operator.mip_levels == scene.mip_levels == 2
+    operator.margin, operator.texture_size = 9, (512, 512)
+    properties.copy_named(operator, scene, properties.PACK_SETTINGS)
+    assert (scene.margin, *scene.texture_size, scene.quality) == (9, 512, 512, "HIGH")
+    obj = rectangles()
     pack(margin=5)
     assert scene.margin == 9, "a script's call is its own affair"
+    assert obj.data.uv_layers.active.name == "UVMap"
 
 
 def test_the_uv_selection_is_left_as_it_was():

@@ -28,8 +28,8 @@ use crate::unwrap::{MeshArrays, Wishes};
 ///     purpose; negative for those that lie alone. ``Atlas.stack`` is one. What is meant so is no overlap, needs no
 ///     margin, and covers the place of one chart.
 /// by_face : bool
-///     Whether to say, too, which faces the numbers are from: ``face_chart`` (f,) int32, -1 without UVs; ``face_l2`` (f,) float64, the L2 stretch at
-///     the best scale of the face's chart; ``flipped_faces`` and ``overlapping_faces``, int32 numbers of faces, ascending.
+///     Whether to say, too, which faces the numbers are from: ``face_chart`` (f,) int32, -1 without UVs; ``flipped_faces``, ``overlapping_faces``
+///     and ``collapsed_faces`` (of which a triangle is degenerate in UV), int32 numbers of faces, ascending.
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
 /// weld, weld_distance : bool, float or None

@@ -147,9 +147,9 @@ pub(crate) fn measures_to_dict(py: Python<'_>, layout: LayoutMeasures, by_face: 
     if by_face {
         let numbers = |faces: Vec<usize>| Array::from_i32(faces.into_iter().map(|face| face as i32).collect());
         dict.set_item("face_chart", Py::new(py, Array::from_i32(found.chart))?)?;
-        dict.set_item("face_l2", Py::new(py, Array::from_f64(found.l2))?)?;
         dict.set_item("flipped_faces", Py::new(py, numbers(found.flipped))?)?;
         dict.set_item("overlapping_faces", Py::new(py, numbers(found.overlapping))?)?;
+        dict.set_item("collapsed_faces", Py::new(py, numbers(found.collapsed))?)?;
     }
     Ok(dict)
 }

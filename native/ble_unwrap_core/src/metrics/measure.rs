@@ -131,10 +131,8 @@ pub(crate) struct TriangleMeasures {
     pub(crate) flipped: Vec<bool>,
     /// Whether it is in a pair of [`Measures::overlaps`].
     pub(crate) overlapping: Vec<bool>,
-    /// Squared L2 stretch at the best scale of the triangle's chart; NaN where it is not measured.
-    pub(crate) squared_l2: Vec<f64>,
-    /// Area on the surface, divided by the squared diagonal of the mesh; 0 where it is not finite.
-    pub(crate) area: Vec<f64>,
+    /// Whether it is one of [`Measures::uv_degenerate_faces`].
+    pub(crate) collapsed: Vec<bool>,
 }
 
 /// Measures a layout: [`measure_each`] without what it finds of each triangle.
@@ -189,6 +187,7 @@ pub(crate) fn measure_each(mesh: &UvMesh, progress: &Progress) -> Result<(Measur
 
     let surface: f64 = faces.iter().map(|f| f.area).sum();
     let flipped = flips(&faces, &topology);
+    let collapsed: Vec<bool> = faces.iter().map(|f| !f.degenerate && f.uv_degenerate).collect();
     let mut out = Measures {
         charts: topology.chart_count,
         islands: topology.island_count,
@@ -196,7 +195,7 @@ pub(crate) fn measure_each(mesh: &UvMesh, progress: &Progress) -> Result<(Measur
         unmapped_faces: topology.chart.iter().filter(|&&c| c == NONE).count(),
         nonfinite_faces: topology.nonfinite,
         degenerate_faces: faces.iter().filter(|f| f.degenerate).count(),
-        uv_degenerate_faces: faces.iter().filter(|f| !f.degenerate && f.uv_degenerate).count(),
+        uv_degenerate_faces: collapsed.iter().filter(|collapsed| **collapsed).count(),
         l2: f64::NAN,
         l2_chart_scale: f64::NAN,
         l2_worst_chart: f64::NAN,
@@ -217,12 +216,7 @@ pub(crate) fn measure_each(mesh: &UvMesh, progress: &Progress) -> Result<(Measur
         uv_box,
         per_chart: Vec::new(),
     };
-    let density = stretch(&mut out, mesh, &faces, &topology);
-    let squared_l2 = |(f, face): (usize, &FaceMeasures)| {
-        if face.measured() { 0.5 * face.squared_norm * density[topology.chart[f] as usize] } else { f64::NAN }
-    };
-    let squared_l2 = faces.iter().enumerate().map(squared_l2).collect();
-    let area = faces.iter().map(|face| face.area).collect();
+    stretch(&mut out, mesh, &faces, &topology);
 
     let texels = mesh.texture().texels();
     let stack = |f: usize| mesh.stack(mesh.label(f)).map(i32::unsigned_abs);
@@ -259,7 +253,7 @@ pub(crate) fn measure_each(mesh: &UvMesh, progress: &Progress) -> Result<(Measur
         None => longest_extent.max(1e-30).powi(2),
     };
     out.packing_efficiency = if common.complete { covered / whole } else { (covered / whole).min(1.0) };
-    Ok((out, TriangleMeasures { chart: topology.chart, flipped, overlapping, squared_l2, area }))
+    Ok((out, TriangleMeasures { chart: topology.chart, flipped, overlapping, collapsed }))
 }
 
 /// The area of all triangles in UV, in which a stack counts once, as its largest chart.
@@ -403,8 +397,8 @@ fn flips(faces: &[FaceMeasures], topology: &UvTopology) -> Vec<bool> {
         .collect()
 }
 
-/// Fills in the figures that are means over measured triangles. Returns each chart's area in UV over that on the surface.
-fn stretch(out: &mut Measures, mesh: &UvMesh, faces: &[FaceMeasures], topology: &UvTopology) -> Vec<f64> {
+/// Fills in the figures that are means over measured triangles.
+fn stretch(out: &mut Measures, mesh: &UvMesh, faces: &[FaceMeasures], topology: &UvTopology) {
     #[derive(Clone, Copy)]
     struct Sums {
         first: usize,
@@ -444,9 +438,8 @@ fn stretch(out: &mut Measures, mesh: &UvMesh, faces: &[FaceMeasures], topology: 
             l2: l2(s),
         })
         .collect();
-    let of_charts = chart.iter().map(|s| s.uv_area / s.area).collect();
     if all.area == 0.0 {
-        return of_charts;
+        return;
     }
     let density = all.uv_area / all.area;
     out.l2 = l2(&all);
@@ -470,7 +463,6 @@ fn stretch(out: &mut Measures, mesh: &UvMesh, faces: &[FaceMeasures], topology: 
         })
         .sum();
     out.area_distortion = area / all.area;
-    of_charts
 }
 
 #[cfg(test)]

@@ -101,13 +101,13 @@ pub struct LayoutMeasures {
 pub struct FaceMeasures {
     /// Chart of each face, as [`Measures::per_chart`] has them; -1 for a face without UVs.
     pub chart: Vec<i32>,
-    /// L2 stretch of each face at the best scale of its chart; NaN where nothing could be measured.
-    pub l2: Vec<f64>,
     /// The faces of which a triangle is one of [`Measures::flips`], ascending.
     pub flipped: Vec<usize>,
     /// The faces of which a triangle is in a pair of [`Measures::overlaps`], ascending. Where that count is incomplete,
     /// so is this list; of triangles of one stack that are the same it has one.
     pub overlapping: Vec<usize>,
+    /// The faces of which a triangle is one of [`Measures::uv_degenerate_faces`], ascending.
+    pub collapsed: Vec<usize>,
 }
 
 impl FaceMeasures {
@@ -120,18 +120,17 @@ impl FaceMeasures {
             found
         };
         let mut chart = vec![-1; faces];
-        let mut sums = vec![[0.0; 2]; faces];
         for (t, &face) in face_of.iter().enumerate() {
             if triangles.chart[t] != NONE {
                 chart[face] = triangles.chart[t] as i32;
             }
-            if !triangles.squared_l2[t].is_nan() {
-                sums[face][0] += triangles.squared_l2[t] * triangles.area[t];
-                sums[face][1] += triangles.area[t];
-            }
         }
-        let l2 = sums.iter().map(|[energy, area]| (energy / area).sqrt()).collect();
-        Self { chart, l2, flipped: with(&triangles.flipped), overlapping: with(&triangles.overlapping) }
+        Self {
+            chart,
+            flipped: with(&triangles.flipped),
+            overlapping: with(&triangles.overlapping),
+            collapsed: with(&triangles.collapsed),
+        }
     }
 }
 
@@ -307,7 +306,25 @@ mod tests {
             assert!((m.l2 - 1.0).abs() < 1e-6 && (m.packing_efficiency - 0.08).abs() < 1e-6, "{m:?}");
             assert!((m.seam_length_absolute - 2.0).abs() < 1e-9, "{m:?}");
             assert!((m.gap_texels - 8.0).abs() < 1e-4, "beyond the search limit: {m:?}");
+            assert_eq!(layout.by_face.chart, [0, 1, -1]);
         }
+    }
+
+    #[test]
+    fn the_faces_that_are_at_fault_are_named() {
+        // The second square lies on a corner of the first one.
+        let mut uv = UV;
+        for (k, other) in [[0.2, 0.2], [0.4, 0.2], [0.4, 0.4], [0.2, 0.4]].into_iter().enumerate() {
+            uv[4 + k] = other;
+        }
+        let layout = measured(&uv, None).expect("a valid layout");
+        assert_eq!(layout.by_face.overlapping, [0, 1]);
+        assert!(layout.measures.overlaps > 0);
+        // A square that is nothing but a line.
+        uv[4..8].copy_from_slice(&[[0.6, 0.6], [0.8, 0.6], [0.8, 0.6], [0.6, 0.6]]);
+        let layout = measured(&uv, None).expect("a valid layout");
+        assert_eq!((layout.by_face.collapsed, layout.measures.uv_degenerate_faces), (vec![1], 2));
+        assert!(layout.by_face.flipped.is_empty() && layout.by_face.overlapping.is_empty());
     }
 
     #[test]
