@@ -1,7 +1,7 @@
 """The certificate of the last run, for the panel, as long as it is true of what is in Blender.
 
-It is shown until one of its objects or maps is gone, a mesh has another number of corners, or undo has taken the UVs
-back; redo brings it back with them. Other edits of the UVs are not watched.
+It is shown until one of its objects or maps is gone, a mesh has another number of corners, or undo, packing or aligning
+has changed the UVs; undo and redo bring it back with them. Other edits of the UVs are not watched.
 """
 
 import json
@@ -84,7 +84,7 @@ def _is_there(name, uid, map_name, corners, _digest):
 
 @bpy.app.handlers.persistent
 def compare(*_):
-    """After undo or redo: whether the UVs are again those that were measured; no where that cannot be told in time."""
+    """After undo, or an operator of ours: whether the UVs are those measured; no where that takes too long to tell."""
     shown = bpy.context.window_manager.ble_unwrap_certificate
     if not shown.lines:
         return

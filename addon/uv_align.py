@@ -81,7 +81,7 @@ def turned(points, island, count, angles):
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, island[inside], points[inside])
     np.maximum.at(high, island[inside], points[inside])
-    middle = (0.5 * (low + high))[island[inside]]
+    middle = 0.5 * (low[island[inside]] + high[island[inside]])
     cos, sin = np.cos(angles)[island[inside]], np.sin(angles)[island[inside]]
     x, y = (points[inside] - middle).T
     result = points.copy()

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty
 
-from .. import faces, properties, targets, uv_align
+from .. import faces, last_result, properties, targets, uv_align
 from ..island_choice import IslandChoice
 from ..wording import counted
 from .map_poll import has_map
@@ -50,6 +50,7 @@ class UV_OT_ble_unwrap_align(bpy.types.Operator):
         except USER_ERRORS as error:
             self.report({"ERROR"}, f"{self.bl_label}: {error}")
             return {"CANCELLED"}
+        last_result.compare()
         for text in islands.warnings:
             self.report({"WARNING"}, text)
         told = [f"{counted(count, 'island')} turned"]

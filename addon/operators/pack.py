@@ -3,7 +3,7 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
-from .. import faces, preferences, properties, targets
+from .. import faces, last_result, preferences, properties, targets
 from ..pack_task import PackTask
 from .map_poll import has_map
 from .with_progress import WithProgress, redraw
@@ -91,6 +91,7 @@ class UV_OT_ble_unwrap_pack(WithProgress, bpy.types.Operator):
 
     def _finish(self, context, task, packed):
         outcome = task.write(packed)
+        last_result.compare()
         if self.from_sidebar:
             properties.copy_named(self.properties, context.scene.ble_unwrap, properties.PACK_SETTINGS)
         for text in outcome.warnings:

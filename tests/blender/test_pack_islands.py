@@ -339,3 +339,36 @@ def test_split_vertices_do_not_part_an_island(addon):
     before = shapes(obj, [np.arange(8)])
     pack()
     assert_one_scale(before, shapes(obj, [np.arange(8)]))
+
+
+def test_linked_meshes_stay_and_are_named(addon, tmp_path):
+    obj = rectangles(name="Linked")
+    bpy.data.libraries.write(str(tmp_path / "library.blend"), {obj})
+    bpy.data.objects.remove(obj)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Linked"]
+    (linked,) = wanted.objects
+    bpy.context.collection.objects.link(linked)
+    own = rectangles(name="Own")
+    select(own, linked)
+    work = task(addon, own, linked)
+    assert work.write(work.run()).warnings == ["Linked: linked from another file, so its islands stay"]
+    assert measured(addon, own)["overlaps"] == 0
+    select(linked)
+    with pytest.raises(RuntimeError, match="Linked: its mesh is linked"):
+        pack()
+
+
+def test_the_last_result_is_put_away_until_undo(addon):
+    """It was of the UVs before."""
+    obj = cube()
+    select(obj)
+    bpy.ops.uv.ble_unwrap()
+    bpy.ops.ed.undo_push(message="unwrap")
+    holds = addon("last_result").is_true
+    assert holds(bpy.context)
+    pack(margin=40)
+    assert not holds(bpy.context)
+    bpy.ops.ed.undo_push(message="pack")
+    bpy.ops.ed.undo()
+    assert holds(bpy.context)
