@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 from scenes import add_mesh, edit, select, set_uvs, uvs
+from test_artist_state import pin
 from test_pack_islands import UNIT, assert_one_scale, quads, rectangles, shapes
 
 align = bpy.ops.uv.ble_unwrap_align
@@ -47,10 +48,7 @@ def shapes_of(uv):
 
 def test_what_is_level_stays_to_the_bit_and_pins_hold():
     obj = tilted([0, 20, 30])
-    layer = obj.data.uv_layers.active
-    if hasattr(layer, "pin_ensure"):
-        layer.pin_ensure()
-    layer.pin[9].value = True
+    pin(obj, [9])
     before = uvs(obj).copy()
     assert align() == {"FINISHED"}
     same = (uvs(obj) == before).reshape(3, 8).all(axis=1)

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from scenes import add_mesh, attribute_names, cube, edit, fingerprint, grid, select, set_uvs, triangle_areas, uvs
-from test_artist_state import select_uv_faces
+from test_artist_state import pin, select_uv_faces
 
 pack = bpy.ops.uv.ble_unwrap_pack
 
@@ -153,24 +153,20 @@ def test_islands_in_part_hidden_stay_and_are_told(addon):
 @pytest.mark.parametrize("lock", [False, True])
 def test_pinned_islands_stay_unless_they_may_move(addon, lock):
     obj = rectangles()
-    layer = obj.data.uv_layers.active
-    if hasattr(layer, "pin_ensure"):
-        layer.pin_ensure()
-    layer.pin[5].value = True
+    pin(obj, [5])
     before = uvs(obj).copy()
     assert pack(lock_pinned=lock) == {"FINISHED"}
     moved = (uvs(obj) != before).any(axis=1).reshape(-1, 4).any(axis=1)
     assert moved.tolist() == [True, not lock, True, True, True]
     assert measured(addon, obj)["overlaps"] == 0
-    assert obj.data.uv_layers.active.pin[5].value
+    pins = np.zeros(20, bool)
+    obj.data.uv_layers.active.pin.foreach_get("value", pins)
+    assert np.flatnonzero(pins).tolist() == [5]
 
 
 def test_where_all_is_pinned_nothing_is_done():
     obj = rectangles(BOXES[:1])
-    layer = obj.data.uv_layers.active
-    if hasattr(layer, "pin_ensure"):
-        layer.pin_ensure()
-    layer.pin[0].value = True
+    pin(obj, [0])
     before = uvs(obj).copy()
     with pytest.raises(RuntimeError, match="Nothing can be moved: 1 island left in place, pinned"):
         pack()
