@@ -26,10 +26,11 @@ def percent(stretch):
     return f"{100 * (stretch - 1):.1f} %" if stretch is not None and np.isfinite(stretch) else "?"
 
 
-def lines(measured, faults, *, margin, stretch_limit, length_text, density_text):
+def lines(measured, faults, *, margin, stretch_limit, length_text, density_of):
     """The lines of a measurement. `faults` are the numbers of faces with each kind of fault.
 
-    `length_text` and `density_text` write a length of the scene, and pixels for each unit of it, with their units.
+    `length_text` writes a length of the scene with its unit; `density_of` makes of pixels for each unit of length the
+    number that is shown and the unit that it is in.
     """
     worst = measured["l2_worst_chart"]
     stretched = not worst <= stretch_limit + STRETCH_SLACK
@@ -54,7 +55,7 @@ def lines(measured, faults, *, margin, stretch_limit, length_text, density_text)
         found.append(_gap(measured, margin))
     found.append(_used(measured))
     if "density" in measured:
-        found.append(_density(measured, density_text))
+        found.append(_density(measured, density_of))
     return [*found, Line("INFO", f"Seams {length_text(float(measured['seam_length_absolute']))} long")]
 
 
@@ -87,9 +88,15 @@ def _used(measured):
     return Line("INFO", f"{100 * float(measured['packing_efficiency']):.0f} % of {of} used")
 
 
-def _density(measured, density_text):
+def _density(measured, density_of):
+    middle, unit = density_of(measured["density"])
     low, high = measured["densities"]
-    text = density_text(measured["density"])
-    if high <= DENSITY_RATIO * low:
-        return Line("INFO", text)
-    return Line("INFO", f"{text}; islands from {density_text(low)} to {density_text(high)}")
+    text = f"{_digits(middle)} {unit}"
+    if high > DENSITY_RATIO * low:
+        text += f", islands {_digits(density_of(low)[0])} to {_digits(density_of(high)[0])}"
+    return Line("INFO", text)
+
+
+def _digits(value):
+    """Three digits of a number, by thousands."""
+    return f"{float(f'{value:.3g}'):,.10g}"

@@ -1,9 +1,9 @@
 """What the last check of UV maps found, for the panel, and whether it is still true of what is in Blender.
 
 It holds as long as the maps, the shapes and the scales of its objects are those that were measured, one of them is
-active, and the settings that it was judged by are the same. Every change is noticed, undo, too: first it is only
-doubted, and when Blender has been quiet for a moment the meshes are compared with what they were. This belongs to the
-session: neither files nor undo hold it.
+active, and the settings that it was judged by are the same. Every change is noticed, undo, too: first the check is
+only doubted, and when Blender has been quiet for a moment the meshes are compared with what they were. This belongs to
+the session: neither files nor undo hold it.
 """
 
 import time
@@ -15,6 +15,9 @@ import numpy as np
 from . import map_state
 
 QUIET_SECONDS = 0.4  # after the last change, before meshes are compared: none is read while something is dragged
+# A check that has been in doubt for longer counts as out of date meanwhile. Selecting, changing modes and the check
+# itself raise doubts that do not last.
+DOUBT_SECONDS = 0.8
 SCALE_TOLERANCE = 1e-4  # relative: what turning an object changes by rounding
 # The settings that figures are in and that they are judged by.
 SETTINGS = ("texture_size", "correct_aspect", "margin", "stretch_limit")
@@ -65,7 +68,7 @@ class _Shown:
     entries = ()
     title, lines, faces, settings = "", (), {}, ()
     same = True  # the meshes were those that were measured when they were last compared
-    doubted_at = None  # when something changed since, or None
+    doubted_from = doubted_at = None  # when something changed since, first and last; None where nothing did
 
 
 def show(context, check):
@@ -73,7 +76,7 @@ def show(context, check):
     _Shown.entries = tuple(map(_Entry.of, check.objects, check.maps))
     _Shown.title, _Shown.lines, _Shown.faces = check.title, tuple(check.lines), check.faces
     _Shown.settings = _settings(context)
-    _Shown.same, _Shown.doubted_at = True, None
+    _Shown.same, _Shown.doubted_from, _Shown.doubted_at = True, None, None
 
 
 def clear():
@@ -99,9 +102,10 @@ def is_current(context):
     objects = [entry.object for entry in _Shown.entries]
     if context.view_layer.objects.active not in objects or not all(entry.is_near() for entry in _Shown.entries):
         return False
-    if _Shown.doubted_at is not None and bpy.app.background:
+    if _Shown.doubted_from is not None and bpy.app.background:
         compare()  # without windows there is nobody to wait for
-    return _Shown.same and _Shown.doubted_at is None
+    since = _Shown.doubted_from
+    return _Shown.same and (since is None or time.monotonic() - since < DOUBT_SECONDS)
 
 
 def faulty_faces(kind):
@@ -113,12 +117,11 @@ def faulty_faces(kind):
 def compare():
     """Settles whether the meshes are those that were measured."""
     _Shown.same = all(entry.is_same() for entry in _Shown.entries)
-    _Shown.doubted_at = None
+    _Shown.doubted_from = _Shown.doubted_at = None
 
 
 def _digests(obj, map_name):
-    uv = map_state.uv_digest(obj, map_name)
-    return (uv, map_state.shape_digest(obj)) if uv is not None else (None, None)
+    return map_state.uv_digest(obj, map_name), map_state.shape_digest(obj)
 
 
 def _settings(context):
@@ -130,6 +133,8 @@ def _settings(context):
 
 def _doubt():
     _Shown.doubted_at = time.monotonic()
+    if _Shown.doubted_from is None:
+        _Shown.doubted_from = _Shown.doubted_at
     if not bpy.app.background and not bpy.app.timers.is_registered(_settle):
         bpy.app.timers.register(_settle, first_interval=QUIET_SECONDS)
 

@@ -73,7 +73,7 @@ def check(objects, settings, *, threads=0):
             margin=settings["margin"],
             stretch_limit=limit,
             length_text=units.length_text,
-            density_text=units.density_text,
+            density_of=units.density,
         ),
         faces={kind: mesh_bridge.by_part(selection, is_meant) for kind, is_meant in faults.items()},
     )

@@ -8,8 +8,8 @@ import numpy as np
 
 from .mesh_arrays import read_array, read_corner_vertices, read_positions
 
-# In edit mode reading UVs takes a second a million corners: above this many it is not tried.
-MOST_EDITED_CORNERS = 200_000
+# In edit mode meshes are read element by element, which takes a second a million corners: larger ones are not tried.
+MOST_EDITED_FACES = 50_000
 
 
 def find(name, uid):
@@ -26,18 +26,15 @@ def corner_count(obj):
 
 
 def read_uv(obj, map_name):
-    """The UVs by corner or point, (n, 2) float32, in either mode; None where there are none or it would take too long.
-
-    Edit mode is not left for it, but a mesh in it is brought up to date.
-    """
+    """The UVs by corner or point, (n, 2) float32, in either mode; None where there are none or it takes too long."""
     data = obj.data
     if obj.type == "MESH" and data.is_editmode:
-        obj.update_from_editmode()
-        faces = bmesh.from_edit_mesh(data).faces
-        layer = bmesh.from_edit_mesh(data).loops.layers.uv.get(map_name)
-        if layer is None or len(data.loops) > MOST_EDITED_CORNERS:
+        edit_mesh = bmesh.from_edit_mesh(data)
+        layer = edit_mesh.loops.layers.uv.get(map_name)
+        if layer is None or len(edit_mesh.faces) > MOST_EDITED_FACES:
             return None
-        return np.array([tuple(loop[layer].uv) for face in faces for loop in face.loops], np.float32).reshape(-1, 2)
+        uv = [tuple(loop[layer].uv) for face in edit_mesh.faces for loop in face.loops]
+        return np.array(uv, np.float32).reshape(-1, 2)
     attribute = data.attributes.get(map_name)
     if attribute is None or attribute.data_type != "FLOAT2":
         return None
@@ -51,8 +48,20 @@ def uv_digest(obj, map_name):
 
 
 def shape_digest(obj):
-    """Digest of the faces and the shape of a mesh; in edit mode as `uv_digest`, which comes first, has updated it."""
-    return _digest(read_positions(obj.data), read_corner_vertices(obj.data))
+    """Digest of the faces and the shape of a mesh, the same in either mode; None where it would take too long.
+
+    A mesh in edit mode is asked itself, and not brought up to date for it: Blender would take that for a change.
+    """
+    mesh = obj.data
+    if not mesh.is_editmode:
+        return _digest(read_positions(mesh), read_corner_vertices(mesh))
+    edit_mesh = bmesh.from_edit_mesh(mesh)
+    if len(edit_mesh.faces) > MOST_EDITED_FACES:
+        return None
+    positions = np.array([tuple(vertex.co) for vertex in edit_mesh.verts], np.float32).reshape(-1, 3)
+    edit_mesh.verts.index_update()
+    corners = [loop.vert.index for face in edit_mesh.faces for loop in face.loops]
+    return _digest(positions, np.array(corners, np.int32))
 
 
 def scale(obj):

@@ -103,9 +103,8 @@ class _Check:
         column = layout.column(align=True)
         current = last_check.is_current(context)
         column.active = current
-        column.label(text=last_check.title(), icon="UV")
-        if not current:
-            column.label(text="Out of date", icon="FILE_REFRESH")
+        title = last_check.title() if current else f"{last_check.title()} (out of date)"
+        column.label(text=title, icon="UV" if current else "FILE_REFRESH")
         for line in last_check.lines():
             icon = STATUS_ICONS.get(line.status, "BLANK1")
             for text in wrapped(line.text):

@@ -5,13 +5,13 @@ import bpy
 METERS_OF = {"METRIC": (1.0, "m"), "IMPERIAL": (0.3048, "ft")}
 
 
-def density_text(pixels_per_unit):
-    """Pixels for each unit of length of the scene, by its metres or feet."""
+def density(pixels_per_unit):
+    """Pixels for each unit of length of the scene as a number of a metre or foot, and what the number is of."""
     units = bpy.context.scene.unit_settings
     if units.system == "NONE":
-        return f"{pixels_per_unit:.4g} px per unit"
+        return pixels_per_unit, "px per unit"
     meters, name = METERS_OF[units.system]
-    return f"{pixels_per_unit / units.scale_length * meters:.4g} px/{name}"
+    return pixels_per_unit / units.scale_length * meters, f"px/{name}"
 
 
 def length_text(length):

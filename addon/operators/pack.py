@@ -100,6 +100,11 @@ class UV_OT_ble_unwrap_pack(WithProgress, bpy.types.Operator):
         redraw(context)
         return {"FINISHED"}
 
+    def _fail(self, error):
+        if "obstacles" in str(error):
+            error = f"{error}. Obstacles are the islands that stay: select them, too, or turn off Around Unselected"
+        return super()._fail(error)
+
 
 def register():
     bpy.utils.register_class(UV_OT_ble_unwrap_pack)

@@ -66,8 +66,8 @@ def test_densities_are_in_the_units_of_the_scene(shown):
     units = bpy.context.scene.unit_settings
     for system, scale, text in (
         ("METRIC", 1.0, "256 px/m"),
-        ("METRIC", 0.01, "2.56e+04 px/m"),
-        ("IMPERIAL", 1.0, "78.03 px/ft"),
+        ("METRIC", 0.01, "25,600 px/m"),
+        ("IMPERIAL", 1.0, "78 px/ft"),
         ("NONE", 1.0, "256 px per unit"),
     ):
         units.system, units.scale_length = system, scale
@@ -84,7 +84,7 @@ def test_islands_of_different_densities_are_told(shown):
         vertex.co = (*(obj.data.vertices[vertex.index - 4].co[:2]), 1.0)  # as large as the other one on the surface
     check()
     (told,) = (text for _, text, _ in shown() if "px/m" in text)
-    assert told == "1581 px/m; islands from 1000 px/m to 2000 px/m"
+    assert told == "1,580 px/m, islands 1,000 to 2,000"
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])

@@ -226,6 +226,14 @@ def test_a_size_that_is_kept_and_an_error_that_changes_nothing(addon):
     assert np.array_equal(uvs(obj), large)
 
 
+def test_where_what_stays_leaves_no_room_the_way_out_is_named():
+    obj = rectangles([(0, 0, 1, 1), (0.2, 0.2, 0.1, 0.1)])
+    edit(obj, faces=[1])
+    with pytest.raises(RuntimeError, match=r"no room for 1 chart.* turn off Around Unselected"):
+        pack()
+    assert pack(keep_unselected=False) == {"FINISHED"}
+
+
 def test_islands_are_spread_over_tiles(addon):
     obj = rectangles()
     before = shapes(obj, quads(obj))
