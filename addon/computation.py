@@ -143,7 +143,7 @@ class ThreadJob(Job):
 
     def __init__(self, call):
         super().__init__(engine.native().Job())
-        self._result = self._error = None
+        self._result = self._error = self._begun_at = None
         self._thread = threading.Thread(target=self._work, args=(call,), daemon=True)
         self._thread.start()
 
@@ -152,6 +152,13 @@ class ThreadJob(Job):
             self._result = engine.call(lambda module: call(module, job=self._job))
         except Exception as error:  # it belongs to whoever asks for the result
             self._error = error
+
+    def progress(self):
+        """Share of the work done, 0 to 1: the native module counts a step as the part of an unwrap that it is."""
+        share = super().progress()
+        if self._begun_at is None and share > 0.0:
+            self._begun_at = share
+        return (share - self._begun_at) / (1.0 - self._begun_at) if self._begun_at not in (None, 1.0) else share
 
     def is_finished(self):
         return not self._thread.is_alive()

@@ -282,6 +282,29 @@ def test_undo_and_redo_are_noticed(current):
     assert not current()
 
 
+def test_comparing_is_no_change_itself(addon):
+    """Else every comparison would be followed by another one, for as long as Blender is open."""
+    obj = flat_grid()
+    edit(obj)
+    check()
+    bpy.context.view_layer.update()
+    changes = []
+
+    def note(_scene, depsgraph):
+        changes.extend(update.id.name for update in depsgraph.updates if update.is_updated_geometry)
+
+    bpy.app.handlers.depsgraph_update_post.append(note)
+    try:
+        addon("last_check").compare()
+        bpy.context.view_layer.update()
+        assert not changes
+        obj.update_from_editmode()
+        bpy.context.view_layer.update()
+        assert changes, "else this test says nothing"
+    finally:
+        bpy.app.handlers.depsgraph_update_post.remove(note)
+
+
 def test_another_file_has_no_check(addon):
     flat_grid()
     check()

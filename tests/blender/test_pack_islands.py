@@ -1,6 +1,7 @@
 """Packing islands that are there: which move, which stay, and that they keep their shape."""
 
 import itertools
+import time
 
 import bmesh
 import bpy
@@ -292,6 +293,9 @@ def test_a_job_on_another_thread_gives_the_same_and_can_be_cancelled(addon):
     many = rectangles(boxes, name="Many")
     before = uvs(many).copy()
     job = task(addon, many, quality="HIGH", keep_stacks=False).start()
+    while job.stage() == "waiting" and not job.is_finished():
+        time.sleep(0.01)
+    assert job.progress() < 0.2, "packing is all that is to be done, not the end of an unwrap"
     job.cancel()
     with pytest.raises(addon("engine").EngineCancelled):
         job.result()
