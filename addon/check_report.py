@@ -23,7 +23,7 @@ class Line:
 
 def percent(stretch):
     """A stretch of 1 and more as the share by which lines are longer, or a question mark."""
-    return f"{100 * (stretch - 1):.1f} %" if stretch is not None and np.isfinite(stretch) else "?"
+    return f"{100 * max(stretch - 1, 0.0):.1f} %" if stretch is not None and np.isfinite(stretch) else "?"
 
 
 def lines(measured, faults, *, margin, stretch_limit, length_text, density_of):
@@ -48,6 +48,8 @@ def lines(measured, faults, *, margin, stretch_limit, length_text, density_of):
         found.append(_fault("COLLAPSED", faults, "face", "", " without area in the map"))
     if faults["UNMAPPED"]:
         found.append(_fault("UNMAPPED", faults, "face", "", " without UVs"))
+    if measured["mirrored"]:
+        found.append(Line("WARN", counted(measured["mirrored"], "mirrored island"), "MIRRORED"))
     if measured["stacked"]:
         text = f"{measured['stacked']:,} islands share pixels in {counted(measured['stacks'], 'stack')}"
         found.append(Line("WARN", text, "STACKED"))

@@ -62,7 +62,10 @@ def check(objects, settings, *, threads=0):
     shapes = _Shapes.of(selection, uv, size)
     measured |= _densities(island, shapes)
     limit = settings["stretch_limit"]
+    mirrored = _mirrored(island, shapes)
+    measured["mirrored"] = int(mirrored.sum())
     faults = _faults(measured, island, stack, shapes, limit)
+    faults["MIRRORED"] = (island >= 0) & np.append(mirrored, False)[island]
     return Check(
         objects=mapped,
         maps=maps,
@@ -85,7 +88,7 @@ class _Shapes:
 
     face: np.ndarray  # (t,)
     surface: np.ndarray  # (t,) area
-    pixels: np.ndarray  # (t,) area, without sign
+    pixels: np.ndarray  # (t,) area, negative where it is seen from behind
     longest: np.ndarray  # (t,) most that a line is longer on the surface than in pixels
     shortest: np.ndarray  # (t,) least
 
@@ -106,8 +109,8 @@ class _Shapes:
             along_v = (other * ax[:, None] - one * bx[:, None]) / twice[:, None]
             uu, uv_, vv = ((p * q).sum(axis=1) for p, q in ((along_u, along_u), (along_u, along_v), (along_v, along_v)))
             longest = np.sqrt(0.5 * (uu + vv + np.hypot(uu - vv, 2 * uv_)))
-            pixels = 0.5 * np.abs(twice)
-            shortest = surface / pixels / longest
+            pixels = 0.5 * twice
+            shortest = surface / np.abs(pixels) / longest
         return cls(face, surface, pixels, longest, shortest)
 
 
@@ -116,7 +119,7 @@ def _densities(island, shapes):
     count = int(island.max(initial=-1)) + 1
     of = island[shapes.face]
     known = (of >= 0) & np.isfinite(shapes.surface) & np.isfinite(shapes.pixels)
-    sums = [np.bincount(of[known], area[known], count) for area in (shapes.surface, shapes.pixels)]
+    sums = [np.bincount(of[known], area[known], count) for area in (shapes.surface, np.abs(shapes.pixels))]
     compared = (sums[0] > SPECK * sums[0].sum()) & (sums[0] > 0)
     if not compared.any():
         return {}
@@ -125,6 +128,13 @@ def _densities(island, shapes):
         "density": float(np.sqrt(sums[1].sum() / sums[0].sum())),
         "densities": (float(each.min()), float(each.max())),
     }
+
+
+def _mirrored(island, shapes):
+    """Which islands lie in the map as they look from behind, for the most part, (k,) bool."""
+    of = island[shapes.face]
+    known = (of >= 0) & np.isfinite(shapes.pixels)
+    return np.bincount(of[known], shapes.pixels[known], int(island.max(initial=-1)) + 1) < 0
 
 
 def _faults(measured, island, stack, shapes, limit):

@@ -26,6 +26,7 @@ class MESH_OT_ble_unwrap_select_faulty(bpy.types.Operator):
             ),
             ("COLLAPSED", "Without Area", "Faces that are a line or a point in the UV map, in part at least"),
             ("UNMAPPED", "Without UVs", "Faces with a UV that is not a number"),
+            ("MIRRORED", "Mirrored", "Faces of islands that lie in the UV map as they look from behind"),
             ("STACKED", "Stacked", "Faces of islands that lie exactly on another one"),
         ),
         default="OVERLAPPING",

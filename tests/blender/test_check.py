@@ -171,6 +171,18 @@ def test_stacks_are_told_apart_from_overlaps(shown):
     assert selected_faces(obj) == {1, 3}
 
 
+def test_mirrored_islands_are_told_and_are_no_flips(shown):
+    obj = rectangles([(0.1, 0.1, 0.2, 0.2), (0.4, 0.4, 0.2, 0.2)])
+    values = uvs(obj).copy()
+    values[4:] = values[:3:-1]
+    set_uvs(obj, values)
+    check()
+    assert ("OK", "No flipped faces", "") in shown()
+    assert ("WARN", "1 mirrored island", "MIRRORED") in shown()
+    select_faulty(kind="MIRRORED")
+    assert selected_faces(obj) == {1}
+
+
 def test_distance_and_tiles(shown):
     obj = rectangles([(0.1, 0.1, 0.2, 0.2), (0.3 + 2 / 1024, 0.1, 0.2, 0.2)])
     bpy.context.scene.ble_unwrap.texture_size = (1024, 1024)
