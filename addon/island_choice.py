@@ -49,10 +49,7 @@ class IslandChoice:
         )
         self.count = int(self.island.max(initial=-1)) + 1
         self.corner_island = np.repeat(self.island, np.diff(selection.face_offsets))
-        mapped = self.corner_island >= 0
-        self.low, self.high = np.full((self.count, 2), np.inf), np.full((self.count, 2), -np.inf)
-        np.minimum.at(self.low, self.corner_island[mapped], self.uv[mapped])
-        np.maximum.at(self.high, self.corner_island[mapped], self.uv[mapped])
+        self.low, self.high = uv_islands.boxes(self.corner_island, self.count, self.uv)
 
     def _choose(self, lock_pinned, selected, hidden):
         self.selected, hidden = self._with(selected), self._with(hidden)

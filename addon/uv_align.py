@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from . import uv_islands
+
 QUARTER = 0.5 * np.pi
 # Directions of borders are collected by whole degrees; those at most this many apart count as one.
 BINS, NEAR_BINS = 90, 1
@@ -78,9 +80,7 @@ def turned(points, island, count, angles):
     Points of no island, -1, stay.
     """
     inside = island >= 0
-    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
-    np.minimum.at(low, island[inside], points[inside])
-    np.maximum.at(high, island[inside], points[inside])
+    low, high = uv_islands.boxes(island, count, points)
     middle = 0.5 * (low[island[inside]] + high[island[inside]])
     cos, sin = np.cos(angles)[island[inside]], np.sin(angles)[island[inside]]
     x, y = (points[inside] - middle).T

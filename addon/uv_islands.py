@@ -83,6 +83,27 @@ def _connected(count, one, other):
             label = further
 
 
+def boxes(corner_island, count, points):
+    """Least and greatest coordinates of each island's points, two of (k, 2); of one without points infinite.
+
+    `corner_island` is the island of each point, (c,); -1 for those that are left out.
+    """
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    order, starts, found = _by_island(corner_island, count)
+    if len(found):
+        low[found] = np.minimum.reduceat(points[order], starts[found])
+        high[found] = np.maximum.reduceat(points[order], starts[found])
+    return low, high
+
+
+def _by_island(corner_island, count):
+    """The corners of islands, one island after the other; where each begins, (k,); and those that have any."""
+    inside = np.flatnonzero(corner_island >= 0)
+    order = inside[np.argsort(corner_island[inside], kind="stable")]
+    sizes = np.bincount(corner_island[inside], minlength=count)
+    return order, np.cumsum(sizes) - sizes, np.flatnonzero(sizes)
+
+
 def stacks(island, face_offsets, uv):
     """A number for each island that islands share which lie on each other; -1 for those that lie alone, (k,) int32.
 
@@ -92,28 +113,25 @@ def stacks(island, face_offsets, uv):
     count = int(island.max(initial=-1)) + 1
     found = np.full(count, -1, np.int32)
     corner_island = np.repeat(island, np.diff(face_offsets))
-    corners = np.flatnonzero(corner_island >= 0)
-    order = corners[np.argsort(corner_island[corners], kind="stable")]
+    order, starts, _ = _by_island(corner_island, count)
     if not len(order):
         return found
-    ends = np.cumsum(np.bincount(corner_island[order], minlength=count))
     places = uv[order].astype(np.float64)
-    starts = np.append(0, ends[:-1])
-    boxes = np.concatenate([np.minimum.reduceat(places, starts), np.maximum.reduceat(places, starts)], axis=1)
+    ends = np.append(starts[1:], len(order))
+    box = np.concatenate(boxes(corner_island, count, uv.astype(np.float64)), axis=1)
     # A box is looked for in its own cell and in those beside it, so that rounding parts none. Two cells may have one
     # key, which only costs a comparison.
     factors = np.array([1, 1_000_003, 998_244_353, 1_000_000_007], np.int64)
-    keys = np.floor(boxes / (4 * STACK_TOLERANCE)).astype(np.int64) @ factors
+    keys = np.floor(box / (4 * STACK_TOLERANCE)).astype(np.int64) @ factors
     steps = np.array(list(itertools.product((-1, 0, 1), repeat=4)), np.int64) @ factors
     bottom = {}  # key of a box's cell -> the lowest islands of the piles that have it
     pile = np.arange(count)
     for number in range(count):
-        box = boxes[number]
-        if (box[2:] - box[:2]).max() <= 4 * STACK_TOLERANCE:
+        if (box[number, 2:] - box[number, :2]).max() <= 4 * STACK_TOLERANCE:
             continue
         near = (keys[number] + steps).tolist()
         for other in itertools.chain.from_iterable(bottom[key] for key in near if key in bottom):
-            same_box = np.abs(boxes[other] - box).max() <= STACK_TOLERANCE
+            same_box = np.abs(box[other] - box[number]).max() <= STACK_TOLERANCE
             if same_box and _same_places(*(places[starts[k] : ends[k]] for k in (number, other))):
                 pile[number] = other
                 break
