@@ -7,7 +7,20 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
-from scenes import add_mesh, attribute_names, cube, edit, fingerprint, grid, select, set_uvs, triangle_areas, uvs
+from scenes import (
+    add_mesh,
+    attribute_names,
+    certificate,
+    cube,
+    edit,
+    fingerprint,
+    grid,
+    select,
+    set_uvs,
+    sphere,
+    triangle_areas,
+    uvs,
+)
 from test_artist_state import pin, select_uv_faces
 
 pack = bpy.ops.uv.ble_unwrap_pack
@@ -380,3 +393,19 @@ def test_the_last_result_is_put_away_until_undo(addon):
     bpy.ops.ed.undo_push(message="pack")
     bpy.ops.ed.undo()
     assert holds(bpy.context)
+
+
+def test_what_was_unwrapped_alone_is_packed_around_the_rest(addon):
+    obj = sphere(cells=6)
+    select(obj)
+    bpy.ops.uv.ble_unwrap()
+    before = uvs(obj).copy()
+    chosen = [face.index for face in obj.data.polygons if face.center.z > 0.3]
+    edit(obj, faces=chosen)
+    bpy.ops.uv.ble_unwrap()
+    assert any("press Pack Only" in text for _, text in certificate())
+    pack()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert measured(addon, obj)["overlaps"] == 0
+    kept = ~np.repeat(np.isin(np.arange(len(obj.data.polygons)), chosen), 4)
+    assert np.array_equal(uvs(obj)[kept], before[kept])
