@@ -166,7 +166,7 @@ def changed(_scene, depsgraph):
 
 @bpy.app.handlers.persistent
 def undone(*_):
-    """After undo or redo, which tell of no changes."""
+    """After undo or redo, whether or not Blender counts them as changes."""
     if _Shown.entries:
         _doubt()
 

@@ -67,28 +67,41 @@ def test_only_selected_islands_are_turned():
     assert same.tolist() == [True, False, True]
 
 
-def test_one_long_straight_border_is_enough_and_inner_edges_do_not_count():
-    # Half a disk, whose faces meet in its middle: of its border, the straight side is 39 %.
+def mapped_as_is(name, points, faces):
+    """A flat mesh whose UVs are its own points."""
+    obj = add_mesh(name, np.column_stack([points, np.zeros(len(points))]), faces)
+    obj.data.uv_layers.new(name="UVMap")
+    set_uvs(obj, points[np.concatenate(faces)])
+    select(obj)
+    return obj
+
+
+def test_one_long_straight_border_is_enough():
+    # Half a disk: of its border, the straight side is 39 %.
     angles = np.linspace(0, np.pi, 25)
     rim = np.column_stack([np.cos(angles), np.sin(angles)])
     points = turn(np.concatenate([[(0, 0)], rim]) * 0.3 + 0.5, 33)
-    faces = [(0, k, k + 1) for k in range(1, 25)]
-    obj = add_mesh("Half", np.column_stack([points, np.zeros(26)]), faces)
-    obj.data.uv_layers.new(name="UVMap")
-    set_uvs(obj, points[np.array(faces).reshape(-1)])
-    select(obj)
+    obj = mapped_as_is("Half", points, [(0, k, k + 1) for k in range(1, 25)])
     align()
     uv = uvs(obj).reshape(-1, 3, 2)
     assert uv[0, 0, 1] == pytest.approx(uv[0, 1, 1], abs=1e-5) == pytest.approx(uv[-1, 2, 1], abs=1e-5)
 
 
+def test_inner_edges_do_not_count():
+    # A square cut into slanting slices, whose sides are three times as long as its border.
+    heights = np.linspace(0, 0.7, 11)
+    left, right = (np.column_stack([np.full(11, x), heights + 0.3 * x]) for x in (0, 1))
+    square = np.concatenate([left, right, [(1, 0), (0, 1)]]) * 0.5 + 0.25
+    faces = [(k, 11 + k, 12 + k, k + 1) for k in range(10)] + [(0, 22, 11), (10, 21, 23)]
+    obj = mapped_as_is("Slices", turn(square, 12), faces)
+    align()
+    np.testing.assert_allclose(np.ptp(uvs(obj), axis=0), (0.5, 0.5), atol=1e-5)
+
+
 def test_without_straight_borders_the_box_gets_smallest():
     angles = np.arange(60) * np.pi / 30
     ellipse = turn(0.5 + np.column_stack([0.4 * np.cos(angles), 0.1 * np.sin(angles)]), 25)
-    obj = add_mesh("Ellipse", np.column_stack([ellipse, np.zeros(60)]), [tuple(range(60))])
-    obj.data.uv_layers.new(name="UVMap")
-    set_uvs(obj, ellipse)
-    select(obj)
+    obj = mapped_as_is("Ellipse", ellipse, [tuple(range(60))])
     align()
     np.testing.assert_allclose(np.ptp(uvs(obj), axis=0), (0.8, 0.2), atol=2e-3)
 

@@ -210,6 +210,22 @@ def test_stacks_stay_stacked_unless_they_are_to_be_parted(addon):
     assert np.ptp(uvs(obj).reshape(5, 4, 2)[0], axis=0).max() < stacked
 
 
+def test_islands_of_one_box_but_another_shape_are_no_stack(addon):
+    """Whichever comes first: all corners of a square are corners of one with a notch, too."""
+    square = UNIT * 0.2 + 0.1
+    notched = np.concatenate([square, [(0.2, 0.2)]])
+    islands = [square, notched, *(np.add(island, (0.5, 0.0)) for island in (notched, square))]
+    points = np.concatenate(islands)
+    ends = np.cumsum([len(island) for island in islands])
+    faces = [tuple(range(end - len(island), end)) for end, island in zip(ends, islands, strict=True)]
+    obj = add_mesh("Notched", np.column_stack([points, np.arange(len(points))]), faces)
+    obj.data.uv_layers.new(name="UVMap")
+    set_uvs(obj, points)
+    select(obj)
+    work = task(addon, obj)
+    assert work.write(work.run()).summary.startswith("4 islands packed, ")
+
+
 def test_islands_in_the_proportions_of_the_image_keep_them(addon):
     obj = rectangles()
     image = bpy.data.images.new("Wide", 1024, 256)
