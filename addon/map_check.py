@@ -38,9 +38,8 @@ def check(objects, settings, *, threads=0):
         raise MeshError("There is no UV map to check")
     selection = mesh_bridge.gather(mapped, whole=True, target=None)
     maps = mesh_bridge.active_maps(selection)
-    held = [map_state.read_uv(obj, name) for obj, name in zip(mapped, maps, strict=True)]
-    # A large mesh is read in object mode, where that takes a fraction of the time.
-    uv = mesh_bridge.read_uvs(selection) if any(values is None for values in held) else np.concatenate(held)
+    # Edit mode is not left for it: a check is no step of Blender's undo.
+    uv = np.concatenate([map_state.read_uv(obj, name) for obj, name in zip(mapped, maps, strict=True)])
     size = settings["texture_size"]
     if settings["correct_aspect"]:
         size, _ = textures.proportioned_size(mapped, maps, size)

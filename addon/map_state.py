@@ -8,7 +8,8 @@ import numpy as np
 
 from .mesh_arrays import read_array, read_corner_vertices, read_positions
 
-# In edit mode meshes are read element by element, which takes a second a million corners: larger ones are not tried.
+# In edit mode meshes are read element by element, which takes a second a million corners: of larger ones there are no
+# digests, which are asked for again and again.
 MOST_EDITED_FACES = 50_000
 
 
@@ -26,15 +27,15 @@ def corner_count(obj):
 
 
 def read_uv(obj, map_name):
-    """The UVs by corner or point, (n, 2) float32, in either mode; None where there are none or it takes too long."""
+    """The UVs by corner or point, (n, 2) float32, in either mode; None where there are none."""
     data = obj.data
     if obj.type == "MESH" and data.is_editmode:
         edit_mesh = bmesh.from_edit_mesh(data)
         layer = edit_mesh.loops.layers.uv.get(map_name)
-        if layer is None or len(edit_mesh.faces) > MOST_EDITED_FACES:
+        if layer is None:
             return None
-        uv = [tuple(loop[layer].uv) for face in edit_mesh.faces for loop in face.loops]
-        return np.array(uv, np.float32).reshape(-1, 2)
+        numbers = (x for face in edit_mesh.faces for loop in face.loops for x in loop[layer].uv)
+        return np.fromiter(numbers, np.float32).reshape(-1, 2)
     attribute = data.attributes.get(map_name)
     if attribute is None or attribute.data_type != "FLOAT2":
         return None
@@ -42,9 +43,15 @@ def read_uv(obj, map_name):
 
 
 def uv_digest(obj, map_name):
-    """Digest of the UVs, the same in either mode; None where `read_uv` gives none."""
-    uv = read_uv(obj, map_name)
+    """Digest of the UVs, the same in either mode; None where there are none or it would take too long."""
+    uv = None if _is_too_large(obj) else read_uv(obj, map_name)
     return None if uv is None else _digest(uv)
+
+
+def _is_too_large(obj):
+    """Whether a digest would take too long."""
+    in_edit_mode = obj.type == "MESH" and obj.data.is_editmode
+    return in_edit_mode and len(bmesh.from_edit_mesh(obj.data).faces) > MOST_EDITED_FACES
 
 
 def shape_digest(obj):
@@ -55,9 +62,9 @@ def shape_digest(obj):
     mesh = obj.data
     if not mesh.is_editmode:
         return _digest(read_positions(mesh), read_corner_vertices(mesh))
-    edit_mesh = bmesh.from_edit_mesh(mesh)
-    if len(edit_mesh.faces) > MOST_EDITED_FACES:
+    if _is_too_large(obj):
         return None
+    edit_mesh = bmesh.from_edit_mesh(mesh)
     positions = np.array([tuple(vertex.co) for vertex in edit_mesh.verts], np.float32).reshape(-1, 3)
     edit_mesh.verts.index_update()
     corners = [loop.vert.index for face in edit_mesh.faces for loop in face.loops]
