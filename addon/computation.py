@@ -1,5 +1,6 @@
 """Atlases computed at once or on another thread: arrays and settings in, UVs out. Knows nothing of Blender."""
 
+import threading
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,6 +81,38 @@ def submit_unwrap_points(positions, settings):
     return Job(engine.call(lambda module: module.submit_unwrap_points(positions, **engine.native_settings(settings))))
 
 
+@dataclass
+class Packed:
+    """One place per point, and the native report."""
+
+    uv: np.ndarray  # (n, 2) float32
+    report: dict
+
+
+def pack(points, triangles, island, settings, **rules):
+    """Packs islands at once. Raises `engine.EngineMissing`, `engine.EngineError`.
+
+    `island` is that of each triangle; `rules` are what the native `pack` takes beside its settings, such as
+    `obstacles`.
+    """
+    return engine.call(_packer(points, triangles, island, settings, rules))
+
+
+def submit_pack(points, triangles, island, settings, **rules):
+    """As `pack`, on another thread: a `Job`."""
+    return ThreadJob(_packer(points, triangles, island, settings, rules))
+
+
+def _packer(points, triangles, island, settings, rules):
+    settings = engine.native_settings(settings)
+
+    def call(module, job=None):
+        packed = module.pack(points, triangles, island, **rules, **settings, job=job)
+        return Packed(np.asarray(packed.uv, np.float32), dict(packed.report))
+
+    return call
+
+
 class Job:
     """A computation on the native module's own thread."""
 
@@ -103,3 +136,35 @@ class Job:
     def result(self):
         """The result of a finished job. Raises `engine.EngineError`, `engine.EngineCancelled`."""
         return _result(engine.call(lambda module: self._job.result()))
+
+
+class ThreadJob(Job):
+    """A call of the native module on a thread of ours, for functions that have none of their own."""
+
+    def __init__(self, call):
+        super().__init__(engine.native().Job())
+        self._result = self._error = self._begun_at = None
+        self._thread = threading.Thread(target=self._work, args=(call,), daemon=True)
+        self._thread.start()
+
+    def _work(self, call):
+        try:
+            self._result = engine.call(lambda module: call(module, job=self._job))
+        except Exception as error:  # it belongs to whoever asks for the result
+            self._error = error
+
+    def progress(self):
+        """Share of the work done, 0 to 1: the native module counts a step as the part of an unwrap that it is."""
+        share = super().progress()
+        if self._begun_at is None and share > 0.0:
+            self._begun_at = share
+        return (share - self._begun_at) / (1.0 - self._begun_at) if self._begun_at not in (None, 1.0) else share
+
+    def is_finished(self):
+        return not self._thread.is_alive()
+
+    def result(self):
+        self._thread.join()
+        if self._error is not None:
+            raise self._error
+        return self._result

@@ -1,4 +1,4 @@
-"""Which faces of a mesh an unwrap is about."""
+"""Which faces of a mesh an operator is about."""
 
 import bmesh
 import bpy
@@ -28,6 +28,19 @@ def chosen_faces(obj, *, only_selected, by_uv=False):
             if not chosen.any():
                 raise NothingToUnwrap("No faces are selected in the UV Editor")
     return None if chosen.all() else chosen
+
+
+def selected_and_hidden(obj, *, by_uv=False):
+    """Which faces are selected, and which are hidden, two of (f,) bool; in object mode all and none.
+
+    In edit mode they are those that are selected in the 3D view; with `by_uv`, those whose UVs are selected, too.
+    """
+    mesh = obj.data
+    if obj.mode != "EDIT":
+        return np.ones(len(mesh.polygons), bool), np.zeros(len(mesh.polygons), bool)
+    hidden = read_array(mesh.polygons, "hide", bool)
+    selected = read_array(mesh.polygons, "select", bool) & ~hidden
+    return (selected & uv_selected_faces(mesh) if by_uv and mesh.uv_layers else selected), hidden
 
 
 def by_uv_selection(context):

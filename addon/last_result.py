@@ -1,22 +1,16 @@
 """The certificate of the last run, for the panel, as long as it is true of what is in Blender.
 
-It is shown until one of its objects or maps is gone, a mesh has another number of corners, or undo has taken the UVs
-back; redo brings it back with them. Other edits of the UVs are not watched.
+It is shown until one of its objects or maps is gone, a mesh has another number of corners, or undo, packing or aligning
+has changed the UVs; undo and redo bring it back with them. Other edits of the UVs are not watched.
 """
 
-import hashlib
 import json
 
-import bmesh
 import bpy
-import numpy as np
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
-from .mesh_arrays import crowded_edges, opposed_edges, read_array
-
-# After undo the UVs are compared. In edit mode that takes a second a million corners: above this many it is not
-# tried, and the certificate is put away.
-MOST_EDITED_CORNERS = 200_000
+from .map_state import corner_count, find, uv_digest
+from .mesh_arrays import crowded_edges, opposed_edges
 
 
 class BLEUnwrapCertificate(bpy.types.PropertyGroup):
@@ -48,7 +42,7 @@ def show(context, title, lines, maps, narrow=(), narrow_charts=0):
     shown.title = title
     shown.lines = json.dumps(lines)
     shown.maps = json.dumps(
-        [(obj.name, obj.session_uid, name, _corner_count(obj), _digest(obj, name)) for obj, name in maps]
+        [(obj.name, obj.session_uid, name, corner_count(obj), uv_digest(obj, name)) for obj, name in maps]
     )
     meshes = [obj.data for obj, _ in maps if obj.type == "MESH"]
     shown.crowded = sum(int(crowded_edges(mesh).sum()) for mesh in meshes)
@@ -72,60 +66,30 @@ def is_true(context):
 def objects(context):
     """The objects that the certificate is of."""
     entries = json.loads(context.window_manager.ble_unwrap_certificate.maps or "[]")
-    found = (_find(name, uid) for name, uid, *_ in entries)
+    found = (find(name, uid) for name, uid, *_ in entries)
     return [obj for obj in found if obj is not None]
 
 
 def narrow_faces(context):
     """The objects of the certificate that have faces in narrow charts: object -> numbers of these faces."""
     entries = json.loads(context.window_manager.ble_unwrap_certificate.narrow or "[]")
-    found = {_find(name, uid): faces for name, uid, faces in entries}
+    found = {find(name, uid): faces for name, uid, faces in entries}
     return {obj: faces for obj, faces in found.items() if obj is not None}
 
 
-def _find(name, uid):
-    obj = bpy.data.objects.get(name)
-    if obj is None or obj.session_uid != uid:
-        obj = next((other for other in bpy.data.objects if other.session_uid == uid), None)  # it was renamed
-    return obj if obj is not None and obj.users_scene else None
-
-
 def _is_there(name, uid, map_name, corners, _digest):
-    obj = _find(name, uid)
-    return obj is not None and map_name in obj.data.attributes and _corner_count(obj) == corners
-
-
-def _corner_count(obj):
-    """Face corners of a mesh; 0 where there are only points."""
-    return len(obj.data.loops) if obj.type == "MESH" else 0
-
-
-def _digest(obj, map_name):
-    """Digest of the UVs, or None where they cannot be read or it would take too long."""
-    data = obj.data
-    if obj.type == "MESH" and data.is_editmode:
-        obj.update_from_editmode()
-        faces = bmesh.from_edit_mesh(data).faces
-        layer = bmesh.from_edit_mesh(data).loops.layers.uv.get(map_name)
-        if layer is None or len(data.loops) > MOST_EDITED_CORNERS:
-            return None
-        uv = np.array([tuple(loop[layer].uv) for face in faces for loop in face.loops], np.float32)
-    else:
-        attribute = data.attributes.get(map_name)
-        if attribute is None or attribute.data_type != "FLOAT2":
-            return None
-        uv = read_array(attribute.data, "vector", np.float32, 2)
-    return hashlib.blake2b(np.ascontiguousarray(uv).tobytes(), digest_size=16).hexdigest()
+    obj = find(name, uid)
+    return obj is not None and map_name in obj.data.attributes and corner_count(obj) == corners
 
 
 @bpy.app.handlers.persistent
 def compare(*_):
-    """After undo or redo: whether the UVs are again those that were measured."""
+    """After undo, or an operator of ours: whether the UVs are those measured; no where that takes too long to tell."""
     shown = bpy.context.window_manager.ble_unwrap_certificate
     if not shown.lines:
         return
     shown.holds = all(
-        (obj := _find(name, uid)) is not None and digest is not None and _digest(obj, map_name) == digest
+        (obj := find(name, uid)) is not None and digest is not None and uv_digest(obj, map_name) == digest
         for name, uid, map_name, _, digest in json.loads(shown.maps)
     )
 

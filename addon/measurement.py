@@ -5,15 +5,17 @@ import numpy as np
 from . import engine
 
 
-def measure(selection, uv, *, texture_size, margin, tiles=1, weld=True, weld_distance=0.0, stacks=None):
+def measure(
+    selection, uv, *, texture_size, margin, tiles=1, weld=True, weld_distance=0.0, stacks=None, by_face=False, threads=0
+):
     """Measures any UVs of a selection, whoever made them; the keys of the native report.
 
     With `weld`, charts run across vertices at one place as in `unwrap`: files often split vertices at every face.
     `stacks` are the chart of each face and the stack of each chart, where charts lie on each other on purpose: what is
-    meant so is no overlap.
+    meant so is no overlap. With `by_face` the numbers of faces are in it, too.
     """
     settings = {"texture_size": texture_size, "margin": float(margin), "tiles": tiles}
-    settings |= {"weld": weld, "weld_distance": weld_distance}
+    settings |= {"weld": weld, "weld_distance": weld_distance, "threads": threads}
     return dict(
         engine.call(
             lambda module: module.measure(
@@ -22,6 +24,7 @@ def measure(selection, uv, *, texture_size, margin, tiles=1, weld=True, weld_dis
                 selection.face_offsets,
                 np.ascontiguousarray(uv, np.float32),
                 corner_triangles=selection.corner_triangles,
+                by_face=by_face,
                 **_stacking(stacks),
                 **engine.native_settings(settings),
             )

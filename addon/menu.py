@@ -20,11 +20,21 @@ def draw_entry(self, _context):
     self.layout.operator("uv.ble_unwrap", icon="UV")
 
 
+def draw_island_entries(self, _context):
+    self.layout.separator()
+    self.layout.operator_context = "INVOKE_DEFAULT"
+    self.layout.operator("uv.ble_unwrap_pack")
+    self.layout.operator("uv.ble_unwrap_align")
+
+
 def register():
     for name in menu_names():
         getattr(bpy.types, name).append(draw_entry)
+    # Beside Blender's own Pack Islands, which the 3D view's menu has not.
+    bpy.types.IMAGE_MT_uvs.append(draw_island_entries)
 
 
 def unregister():
+    bpy.types.IMAGE_MT_uvs.remove(draw_island_entries)
     for name in menu_names():
         getattr(bpy.types, name).remove(draw_entry)

@@ -88,6 +88,7 @@ def gather(
     *,
     only_selected=False,
     by_uv=False,
+    whole=False,
     target=ACTIVE_MAP,
     move_pinned=True,
     sharp_angle=ONLY_MARKED,
@@ -96,21 +97,23 @@ def gather(
 ):
     """Reads the objects' base meshes (before modifiers and shape keys) as one `Selection`.
 
-    `only_selected` and `by_uv` as in `chosen_faces`; they matter for objects in edit mode. `target` is the UV map that
-    will be written, `sharp_angle` is in degrees, `seams_away` and `seams_here` name what is painted (`painted`). Raises
+    `only_selected` and `by_uv` as in `chosen_faces`; they matter for objects in edit mode. With `whole` all faces are
+    read, in edit mode hidden ones, too. `target` is the UV map that will be written, or None where none will be;
+    `sharp_angle` is in degrees, `seams_away` and `seams_here` name what is painted (`painted`). Raises
     `MeshError` where the map cannot be written, or where pinned UVs would be moved and may not be.
     """
     warnings, parts, blocks, reasons, found = [], [], [], [], set()
     vertex_base = corner_base = face_base = 0
     for obj in objects:
         mesh = obj.data
-        uv_maps.check_writable(obj, target)
+        if target is not None:
+            uv_maps.check_writable(obj, target)
         if obj.mode == "EDIT":
             obj.update_from_editmode()
         if not mesh.polygons:
             continue
         try:
-            chosen = chosen_faces(obj, only_selected=only_selected, by_uv=by_uv)
+            chosen = None if whole else chosen_faces(obj, only_selected=only_selected, by_uv=by_uv)
         except NothingToUnwrap as error:
             reasons.append(error)
             continue

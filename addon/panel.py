@@ -4,7 +4,7 @@ import json
 
 import bpy
 
-from . import last_result, properties, targets
+from . import last_check, last_result, properties, targets
 
 CATEGORY = "BLE Unwrap"
 STATUS_ICONS = {"HEAD": "DOT", "OK": "CHECKMARK", "BAD": "ERROR", "WARN": "INFO", "INFO": "BLANK1"}
@@ -54,6 +54,9 @@ class _Main:
         row.scale_y = 1.4
         row.operator_context = "INVOKE_DEFAULT"
         row.operator("uv.ble_unwrap", icon="UV")
+        row = layout.row()
+        row.operator_context = "INVOKE_DEFAULT"
+        row.operator("uv.ble_unwrap_pack", text="Pack Only")
         draw_settings(layout, context, ("preset", *properties.MAIN_SETTINGS))
 
 
@@ -85,6 +88,32 @@ class _Certificate:
         if narrow := certificate.narrow_charts:
             text = f"Select {narrow:,} Narrow Chart{'' if narrow == 1 else 's'}"
             self.layout.operator("mesh.ble_unwrap_select_narrow", text=text, icon="FACESEL")
+
+
+class _Check:
+    bl_label = "Check"
+    bl_category = CATEGORY
+    bl_region_type = "UI"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.operator("uv.ble_unwrap_check", icon="VIEWZOOM")
+        if not last_check.title():
+            return
+        column = layout.column(align=True)
+        current = last_check.is_current(context)
+        column.active = current
+        title = last_check.title() if current else f"{last_check.title()} (out of date)"
+        column.label(text=title, icon="UV" if current else "FILE_REFRESH")
+        for line in last_check.lines():
+            icon = STATUS_ICONS.get(line.status, "BLANK1")
+            for text in wrapped(line.text):
+                column.label(text=text, icon=icon)
+                icon = "BLANK1"
+            if line.kind:
+                row = column.row()
+                row.label(icon="BLANK1")
+                row.operator("mesh.ble_unwrap_select_faulty", text="Select", icon="FACESEL").kind = line.kind
 
 
 class _Advanced:
@@ -128,6 +157,11 @@ class IMAGE_PT_ble_unwrap_certificate(_Certificate, bpy.types.Panel):
     bl_parent_id = "IMAGE_PT_ble_unwrap"
 
 
+class IMAGE_PT_ble_unwrap_check(_Check, bpy.types.Panel):
+    bl_space_type = "IMAGE_EDITOR"
+    bl_parent_id = "IMAGE_PT_ble_unwrap"
+
+
 class IMAGE_PT_ble_unwrap_advanced(_Advanced, bpy.types.Panel):
     bl_space_type = "IMAGE_EDITOR"
     bl_parent_id = "IMAGE_PT_ble_unwrap"
@@ -142,6 +176,11 @@ class VIEW3D_PT_ble_unwrap_certificate(_Certificate, bpy.types.Panel):
     bl_parent_id = "VIEW3D_PT_ble_unwrap"
 
 
+class VIEW3D_PT_ble_unwrap_check(_Check, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "VIEW3D_PT_ble_unwrap"
+
+
 class VIEW3D_PT_ble_unwrap_advanced(_Advanced, bpy.types.Panel):
     bl_space_type = "VIEW_3D"
     bl_parent_id = "VIEW3D_PT_ble_unwrap"
@@ -150,9 +189,11 @@ class VIEW3D_PT_ble_unwrap_advanced(_Advanced, bpy.types.Panel):
 CLASSES = (
     IMAGE_PT_ble_unwrap,
     IMAGE_PT_ble_unwrap_certificate,
+    IMAGE_PT_ble_unwrap_check,
     IMAGE_PT_ble_unwrap_advanced,
     VIEW3D_PT_ble_unwrap,
     VIEW3D_PT_ble_unwrap_certificate,
+    VIEW3D_PT_ble_unwrap_check,
     VIEW3D_PT_ble_unwrap_advanced,
 )
 

@@ -252,6 +252,8 @@ SURFACE_SETTINGS = (
     *sorted(settings_table.taken_by("unwrap") - settings_table.taken_by("unwrap_points")),
 )
 CLOUD_SETTINGS = ("neighbours",)
+# What packing islands that are there has in common with an unwrap, in the order in which it is shown.
+PACK_SETTINGS = ("texture_size", "correct_aspect", "margin", "mip_levels", "rotation", "quality", "tiles")
 
 # What the panel shows at once, and what it folds away, by title.
 MAIN_SETTINGS = ("stretch_limit", "texture_size", "margin", "rotation", "use_seams", "use_selection")
@@ -289,8 +291,8 @@ def native_values(settings, left_out):
     return {name: value for name, value in settings.items() if name not in BRIDGE_SETTINGS and name not in left_out}
 
 
-def operator_annotations():
-    """The same settings for an operator.
+def operator_annotations(names=None):
+    """The same settings, or those of these names, for an operator.
 
     They are not remembered from its last run, since the scene keeps them: what a call leaves out comes from the scene
     (interactively) or from the defaults (in a script).
@@ -298,15 +300,17 @@ def operator_annotations():
     return {
         name: deferred.function(**{**deferred.keywords, "options": {"SKIP_SAVE"}})
         for name, deferred in annotations().items()
+        if names is None or name in names
     }
 
 
-def copy_unset(target, source):
-    """Gives `target` the values of `source` for every setting that `target` does not have set itself."""
-    explicit = {name for name in annotations() if target.is_property_set(name)}
+def copy_unset(target, source, names=None):
+    """Gives `target` the values of `source` for every setting, or those of `names`, that it does not have set."""
+    names = annotations() if names is None else names
+    explicit = {name for name in names if target.is_property_set(name)}
     # A preset named in the call brings its own values: the scene's must not override them.
     kept = (*BRIDGE_SETTINGS, *KEPT_BY_PRESETS)
-    names = [name for name in annotations() if "preset" not in explicit or name in kept]
+    names = [name for name in names if "preset" not in explicit or name in kept]
     for name in names:
         if name not in explicit and source.is_property_set(name):
             setattr(target, name, getattr(source, name))
@@ -314,10 +318,7 @@ def copy_unset(target, source):
 
 def copy_changed(source, target):
     """Gives `target` the values of `source` wherever they differ; the preset first, which brings others."""
-    for name in annotations():
-        value = getattr(source, name)
-        if _plain(name, getattr(target, name)) != _plain(name, value):
-            setattr(target, name, value)
+    copy_named(source, target, annotations())
 
 
 def values(settings):
@@ -331,6 +332,19 @@ def values(settings):
     chosen = PRESET_MAPS.get(settings.preset, {})
     unset = {name: value for name, value in chosen.items() if not settings.is_property_set(name)}
     return found | unset
+
+
+def copy_named(source, target, names):
+    """Gives `target` the values of `source` for these settings, wherever they differ."""
+    for name in names:
+        value = getattr(source, name)
+        if _plain(name, getattr(target, name)) != _plain(name, value):
+            setattr(target, name, value)
+
+
+def plain_values(settings, names):
+    """These settings as plain values."""
+    return {name: _plain(name, getattr(settings, name)) for name in names}
 
 
 def _plain(name, value):

@@ -1,9 +1,13 @@
 """Registers the add-on's modules in order, and takes them back in reverse."""
 
-from . import command, last_result, menu, panel, preferences, properties
-from .operators import select_edges, select_narrow, unwrap
+from . import command, last_check, last_result, menu, panel, preferences, properties
+from .operators import align, check, pack, select_edges, select_faulty, select_narrow, unwrap
 
-MODULES = (preferences, properties, last_result, unwrap, select_edges, select_narrow, panel, menu, command)
+MODULES = (
+    *(preferences, properties, last_result, last_check),
+    *(unwrap, pack, align, check, select_edges, select_narrow, select_faulty),
+    *(panel, menu, command),
+)
 
 
 def register():

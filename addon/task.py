@@ -167,7 +167,7 @@ class UnwrapTask:
             if overlaps:
                 warnings.append(
                     f"New charts overlap faces that were not unwrapped ({counted(overlaps, 'pair')} of triangles): "
-                    "select those faces, too, turn on Keep Place, or pack all charts afterwards (UV > Pack Islands)"
+                    "press Pack Only, which packs the selected islands around the others, or select those faces, too"
                 )
         certificate = surface_report.certify(measured, margin=margin, warnings=warnings, **limit)
         notes = [*self.notes, *surface_report.found(result.report)]

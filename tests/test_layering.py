@@ -345,6 +345,9 @@ PLAIN_MAY_IMPORT = {
     "measurement.py": {"numpy", ".engine"},
     "certificate.py": set(),
     "wording.py": {"numpy"},
+    "uv_islands.py": {"numpy"},
+    "uv_align.py": {"numpy", ".uv_islands"},
+    "check_report.py": {"numpy", ".certificate", ".surface_report", ".wording"},
     "surface_report.py": {"numpy", ".certificate", ".wording"},
     "cloud_report.py": {".certificate", ".wording"},
 }
@@ -355,10 +358,11 @@ BRIDGES = {".mesh_bridge", ".cloud_bridge"}
 NEVER = {
     **{
         f"{name}.py": NATIVE | BRIDGES | {".properties"}
-        for name in ("mesh_arrays", "faces", "seams", "uv_maps", "textures", "units")
+        for name in ("mesh_arrays", "faces", "seams", "uv_maps", "map_state", "textures", "units")
     },
     "settings_table.py": NATIVE | BRIDGES | {"bpy", "bmesh", "numpy", ".properties"},
     "last_result.py": NATIVE | BRIDGES,
+    "last_check.py": NATIVE | BRIDGES,
     "mesh_bridge.py": NATIVE | {".cloud_bridge"},
     "cloud_bridge.py": NATIVE,
     "point_file.py": NATIVE | BRIDGES | {"bpy", "bmesh"},

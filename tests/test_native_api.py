@@ -387,6 +387,29 @@ def test_measure_knows_a_bad_layout(square):
         native.measure(*square, np.zeros((4, 2)), chart=np.zeros(2, np.int32))
 
 
+def test_measure_says_which_faces_its_numbers_are_from():
+    positions, corners, offsets = grid(4, 4)
+    uv = positions[corners, :2].astype(np.float32)
+    right = uv[:, 0] > 0.75
+    uv[right, 0] = 1.5 - uv[right, 0]  # the last column of faces is folded back over the one before it
+    uv[0] = np.nan
+    uv[4 * 13 : 4 * 14, 1] = 0.75  # nothing but a line
+    plain = native.measure(positions, corners, offsets, uv)
+    found = native.measure(positions, corners, offsets, uv, by_face=True)
+    faces = {name: np.asarray(found.pop(name)) for name in set(found) - set(plain)}
+    assert found.keys() == plain.keys() and repr(found) == repr(plain)
+    assert all(array.dtype == np.int32 for array in faces.values())
+    chart = faces.pop("face_chart")
+    assert chart.shape == (16,) and np.flatnonzero(chart < 0).tolist() == [0]
+    assert chart.max() == found["charts"] - 1
+    assert {name: numbers.tolist() for name, numbers in faces.items()} == {
+        "flipped_faces": [3, 7, 11, 15],
+        "overlapping_faces": [2, 3, 6, 7, 10, 11, 14, 15],
+        "collapsed_faces": [13],
+    }
+    assert (found["flips"], found["uv_degenerate_triangles"]) == (8, 2)
+
+
 def test_pack_keeps_shapes_and_the_margin():
     count, size, margin = 12, (256, 128), 3.0
     sides = 0.5 + np.arange(count) / count

@@ -2,6 +2,9 @@
 
 import bmesh
 import bpy
+import numpy as np
+
+from ..mesh_arrays import read_array
 
 
 def leave_edit_mode(context):
@@ -28,3 +31,11 @@ def select_elements(context, found, kind):
         for number in numbers:
             elements[number].select_set(True)
         bmesh.update_edit_mesh(obj.data, loop_triangles=False, destructive=False)
+
+
+def visible_faces(mesh, faces):
+    """Those of the faces, by number, that are there and that edit mode would show."""
+    hidden = read_array(mesh.polygons, "hide", bool)
+    faces = np.array(faces, np.int64)
+    faces = faces[faces < len(hidden)]
+    return faces[~hidden[faces]]

@@ -1,11 +1,9 @@
 """The operator `mesh.ble_unwrap_select_narrow`: shows where the charts are that are too narrow for the texture."""
 
 import bpy
-import numpy as np
 
 from .. import last_result
-from ..mesh_arrays import read_array
-from .edit_selection import leave_edit_mode, select_elements
+from .edit_selection import leave_edit_mode, select_elements, visible_faces
 
 
 class MESH_OT_ble_unwrap_select_narrow(bpy.types.Operator):
@@ -35,14 +33,6 @@ class MESH_OT_ble_unwrap_select_narrow(bpy.types.Operator):
         count = sum(map(len, found.values()))
         self.report({"INFO"}, f"{count:,} face{'' if count == 1 else 's'} selected")
         return {"FINISHED"}
-
-
-def visible_faces(mesh, faces):
-    """Those of the faces, by number, that are there and that edit mode would show."""
-    hidden = read_array(mesh.polygons, "hide", bool)
-    faces = np.array(faces, np.int64)
-    faces = faces[faces < len(hidden)]
-    return faces[~hidden[faces]]
 
 
 def register():

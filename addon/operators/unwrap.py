@@ -3,31 +3,13 @@
 import bpy
 from bpy.props import BoolProperty
 
-from .. import engine, faces, kept_analysis, last_result, mesh_bridge, preferences, properties, targets
+from .. import faces, kept_analysis, last_result, preferences, properties, targets
 from ..panel import panel_settings
 from ..run import Run
-
-# The add-on's failures that are the user's business; anything else is a bug and may show its traceback.
-USER_ERRORS = (mesh_bridge.MeshError, engine.EngineMissing, engine.EngineError)
-
-POLL_SECONDS = 0.1
-CANCEL_POLLS = 100  # after Esc, wait at most this many polls for the worker before letting it go
-
-# While a job runs the view may be moved and zoomed; everything else waits, so that the mesh stays as it was read.
-PASSED_EVENTS = {
-    "MIDDLEMOUSE",
-    "MOUSEMOVE",
-    "INBETWEEN_MOUSEMOVE",
-    "WHEELUPMOUSE",
-    "WHEELDOWNMOUSE",
-    "TRACKPADPAN",
-    "TRACKPADZOOM",
-    "MOUSEROTATE",
-    "WINDOW_DEACTIVATE",
-}
+from .with_progress import WithProgress, redraw
 
 
-class UV_OT_ble_unwrap(bpy.types.Operator):
+class UV_OT_ble_unwrap(WithProgress, bpy.types.Operator):
     bl_idname = "uv.ble_unwrap"
     bl_label = "BLE Unwrap"
     bl_description = (
@@ -56,54 +38,10 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
     def invoke(self, context, _event):
         properties.copy_unset(self.properties, context.scene.ble_unwrap)
         self.from_sidebar = True
-        if bpy.app.background:
-            return self.execute(context)
-        try:
-            run = self._run(context)
-            if run.element_count < preferences.preference(context, "modal_threshold"):
-                return self._finish(context, run, run.run())
-            self._start(context, run)
-        except USER_ERRORS as error:
-            return self._fail(error)
-        return {"RUNNING_MODAL"}
+        return self.compute(context, in_background=not bpy.app.background)
 
     def execute(self, context):
-        try:
-            run = self._run(context)
-            return self._finish(context, run, run.run())
-        except USER_ERRORS as error:
-            return self._fail(error)
-
-    def modal(self, context, event):
-        if event.type == "ESC" and event.value == "PRESS":
-            self._cancel_requested = True
-            self._job.cancel()
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"} if event.type in PASSED_EVENTS else {"RUNNING_MODAL"}
-        if self._cancel_requested:
-            self._cancel_polls += 1
-            if self._job.is_finished() or self._cancel_polls > CANCEL_POLLS:
-                self._stop(context)
-                self.report({"WARNING"}, "BLE Unwrap: cancelled, nothing was changed")
-                return {"CANCELLED"}
-            return {"RUNNING_MODAL"}
-        if not self._job.is_finished():
-            self._show_progress(context)
-            return {"RUNNING_MODAL"}
-        job = self._job
-        self._stop(context)
-        try:
-            return self._finish(context, self._running, job.result())
-        except engine.EngineCancelled:
-            self.report({"WARNING"}, "BLE Unwrap: cancelled, nothing was changed")
-            return {"CANCELLED"}
-        except USER_ERRORS as error:
-            return self._fail(error)
-
-    def cancel(self, context):
-        """Blender itself ends the operator: a file is loaded or the window closes."""
-        self._job.cancel()
-        self._stop(context)
+        return self.compute(context, in_background=False)
 
     def draw(self, context):
         layout = self.layout
@@ -122,7 +60,7 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
                 for name in names:
                     body.prop(self, name)
 
-    def _run(self, context):
+    def _prepare(self, context):
         if not self.properties.is_property_set("by_uv"):
             self.by_uv = faces.by_uv_selection(context)
         return Run(
@@ -132,27 +70,6 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
             keep=True,  # the redo panel unwraps the same meshes again
             by_uv=self.by_uv,
         )
-
-    def _start(self, context, run):
-        self._running = run
-        self._job = run.start()
-        self._cancel_requested = False
-        self._cancel_polls = 0
-        manager = context.window_manager
-        self._timer = manager.event_timer_add(POLL_SECONDS, window=context.window)
-        manager.modal_handler_add(self)
-        manager.progress_begin(0, 100)
-        self._show_progress(context)
-
-    def _show_progress(self, context):
-        percent = int(100 * self._job.progress())
-        context.window_manager.progress_update(percent)
-        context.workspace.status_text_set(f"BLE Unwrap: {percent}%  {self._job.stage()}    [Esc] cancel")
-
-    def _stop(self, context):
-        context.window_manager.event_timer_remove(self._timer)
-        context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
 
     def _finish(self, context, run, results):
         outcomes = run.write(results, measure_again=preferences.preference(context, "measure_again"))
@@ -179,10 +96,6 @@ class UV_OT_ble_unwrap(bpy.types.Operator):
         redraw(context)
         return {"FINISHED"}
 
-    def _fail(self, error):
-        self.report({"ERROR"}, f"BLE Unwrap: {error}")
-        return {"CANCELLED"}
-
 
 def titles(outcomes):
     """What the result is of, in a few words."""
@@ -197,14 +110,6 @@ def certificate_lines(outcomes):
             result.append(("HEAD", outcome.title))
         result.extend(outcome.lines)
     return result
-
-
-def redraw(context):
-    """Shows new UVs and the certificate in every editor."""
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type in {"IMAGE_EDITOR", "VIEW_3D"}:
-                area.tag_redraw()
 
 
 @bpy.app.handlers.persistent

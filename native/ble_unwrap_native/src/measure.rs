@@ -27,6 +27,9 @@ use crate::unwrap::{MeshArrays, Wishes};
 ///     For each chart of ``chart``, which is needed then, a number that charts share which lie on each other on
 ///     purpose; negative for those that lie alone. ``Atlas.stack`` is one. What is meant so is no overlap, needs no
 ///     margin, and covers the place of one chart.
+/// by_face : bool
+///     Whether to say, too, which faces the numbers are from: ``face_chart`` (f,) int32, -1 without UVs; ``flipped_faces``, ``overlapping_faces``
+///     and ``collapsed_faces`` (of which a triangle is degenerate in UV), int32 numbers of faces, ascending.
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
 /// weld, weld_distance : bool, float or None
@@ -70,7 +73,7 @@ use crate::unwrap::{MeshArrays, Wishes};
 ///
 /// Sander, Snyder, Gortler, Hoppe: Texture mapping progressive meshes, SIGGRAPH 2001.
 #[pyfunction]
-#[pyo3(signature = (positions, corner_vertices, face_offsets, uv, *, chart=None, stacks=None, corner_triangles=None, job=None, **settings))]
+#[pyo3(signature = (positions, corner_vertices, face_offsets, uv, *, chart=None, stacks=None, corner_triangles=None, by_face=false, job=None, **settings))]
 pub(crate) fn measure(
     py: Python<'_>,
     positions: &Bound<'_, PyAny>,
@@ -80,6 +83,7 @@ pub(crate) fn measure(
     chart: Option<&Bound<'_, PyAny>>,
     stacks: Option<&Bound<'_, PyAny>>,
     corner_triangles: Option<&Bound<'_, PyAny>>,
+    by_face: bool,
     job: Option<Bound<'_, Job>>,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyAny>> {
@@ -95,7 +99,7 @@ pub(crate) fn measure(
             let (chart, stack) = (chart.as_deref(), stacks.as_deref().unwrap_or_default());
             measure_layout(&mesh.input(), &uv, chart, stack, &call.settings, progress).map_err(Failure::from)
         },
-        |py, layout| Ok(report::measures_to_dict(py, layout)?.into_any().unbind()),
+        move |py, layout| Ok(report::measures_to_dict(py, layout, by_face)?.into_any().unbind()),
     )?;
     job.get().finish(py)
 }

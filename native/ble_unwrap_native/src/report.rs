@@ -5,6 +5,8 @@ use ble_unwrap_core::{Certificate, Report};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::owned_array::Array;
+
 /// The report of an unwrap.
 pub(crate) fn to_dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyDict>> {
     let Report {
@@ -113,8 +115,12 @@ pub(crate) fn certificate_to_dict<'py>(py: Python<'py>, certificate: &Certificat
 }
 
 /// The measures of a layout, with the keys of a report and some of their own.
-pub(crate) fn measures_to_dict(py: Python<'_>, layout: LayoutMeasures) -> PyResult<Bound<'_, PyDict>> {
-    let LayoutMeasures { faces, unmapped_faces, bent_quads, measures, .. } = layout;
+pub(crate) fn measures_to_dict(
+    py: Python<'_>,
+    layout: LayoutMeasures,
+    with_faces: bool,
+) -> PyResult<Bound<'_, PyDict>> {
+    let LayoutMeasures { faces, unmapped_faces, bent_quads, measures, by_face, .. } = layout;
     let dict = PyDict::new(py);
     dict.set_item("charts", measures.charts)?;
     dict.set_item("islands", measures.islands)?;
@@ -142,6 +148,13 @@ pub(crate) fn measures_to_dict(py: Python<'_>, layout: LayoutMeasures) -> PyResu
     dict.set_item("gap_complete", measures.gap_complete)?;
     dict.set_item("uv_box", measures.uv_box)?;
     dict.set_item("chart_l2", measures.per_chart.iter().map(|chart| chart.l2).collect::<Vec<_>>())?;
+    if with_faces {
+        let numbers = |faces: Vec<usize>| Array::from_i32(faces.into_iter().map(|face| face as i32).collect());
+        dict.set_item("face_chart", Py::new(py, Array::from_i32(by_face.chart))?)?;
+        dict.set_item("flipped_faces", Py::new(py, numbers(by_face.flipped))?)?;
+        dict.set_item("overlapping_faces", Py::new(py, numbers(by_face.overlapping))?)?;
+        dict.set_item("collapsed_faces", Py::new(py, numbers(by_face.collapsed))?)?;
+    }
     Ok(dict)
 }
 

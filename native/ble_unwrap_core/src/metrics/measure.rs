@@ -122,7 +122,28 @@ pub struct Measures {
     pub per_chart: Vec<ChartMeasures>,
 }
 
-/// Measures a layout.
+/// What was found of each triangle of a layout.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct TriangleMeasures {
+    /// Chart, numbered by lowest triangle; [`NONE`] without UV.
+    pub(crate) chart: Vec<u32>,
+    /// Whether it is one of [`Measures::flips`].
+    pub(crate) flipped: Vec<bool>,
+    /// Whether it is in a pair of [`Measures::overlaps`].
+    pub(crate) overlapping: Vec<bool>,
+    /// Whether it is one of [`Measures::uv_degenerate_faces`].
+    pub(crate) collapsed: Vec<bool>,
+}
+
+/// Measures a layout: [`measure_each`] without what it finds of each triangle.
+///
+/// # Errors
+/// [`Cancelled`].
+pub(crate) fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Cancelled> {
+    Ok(measure_each(mesh, progress)?.0)
+}
+
+/// Measures a layout, as a whole and triangle by triangle.
 ///
 /// UVs are taken in the proportions of the texture, so a layout for a 2:1 texture that shows no
 /// distortion on the surface has none here either. A UV unit is `width`×`height` texels even where the
@@ -134,7 +155,7 @@ pub struct Measures {
 ///
 /// # Errors
 /// [`Cancelled`].
-pub(crate) fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Cancelled> {
+pub(crate) fn measure_each(mesh: &UvMesh, progress: &Progress) -> Result<(Measures, TriangleMeasures), Cancelled> {
     let m = mesh.triangle_count();
     memory::require((m as u64).saturating_mul(OF_TRIANGLE)).map_err(Cancelled::OutOfMemory)?;
     let (positions, unit) = unit_positions(mesh);
@@ -165,6 +186,8 @@ pub(crate) fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Ca
     progress.check()?;
 
     let surface: f64 = faces.iter().map(|f| f.area).sum();
+    let flipped = flips(&faces, &topology);
+    let collapsed: Vec<bool> = faces.iter().map(|f| !f.degenerate && f.uv_degenerate).collect();
     let mut out = Measures {
         charts: topology.chart_count,
         islands: topology.island_count,
@@ -172,7 +195,7 @@ pub(crate) fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Ca
         unmapped_faces: topology.chart.iter().filter(|&&c| c == NONE).count(),
         nonfinite_faces: topology.nonfinite,
         degenerate_faces: faces.iter().filter(|f| f.degenerate).count(),
-        uv_degenerate_faces: faces.iter().filter(|f| !f.degenerate && f.uv_degenerate).count(),
+        uv_degenerate_faces: collapsed.iter().filter(|collapsed| **collapsed).count(),
         l2: f64::NAN,
         l2_chart_scale: f64::NAN,
         l2_worst_chart: f64::NAN,
@@ -180,7 +203,7 @@ pub(crate) fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Ca
         l_infinity: f64::NAN,
         angle_distortion: f64::NAN,
         area_distortion: f64::NAN,
-        flips: flips(&faces, &topology),
+        flips: flipped.iter().filter(|flipped| **flipped).count(),
         overlaps: 0,
         overlaps_between: 0,
         overlaps_complete: true,
@@ -218,7 +241,7 @@ pub(crate) fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Ca
     }
     let of: Vec<Belonging> =
         (0..m).map(|f| Belonging { group: topology.island[f], stack: stack(f).unwrap_or(NONE) }).collect();
-    let common = overlaps(&uv, &of, OVERLAP_SHARE * layout_box, progress)?;
+    let (common, overlapping) = overlaps(&uv, &of, OVERLAP_SHARE * layout_box, progress)?;
     out.overlaps = common.pairs;
     out.overlaps_between = common.between;
     out.overlaps_complete = common.complete;
@@ -230,7 +253,7 @@ pub(crate) fn measure(mesh: &UvMesh, progress: &Progress) -> Result<Measures, Ca
         None => longest_extent.max(1e-30).powi(2),
     };
     out.packing_efficiency = if common.complete { covered / whole } else { (covered / whole).min(1.0) };
-    Ok(out)
+    Ok((out, TriangleMeasures { chart: topology.chart, flipped, overlapping, collapsed }))
 }
 
 /// The area of all triangles in UV, in which a stack counts once, as its largest chart.
@@ -360,8 +383,8 @@ fn unit_positions(mesh: &UvMesh) -> (Vec<Point3<f64>>, f64) {
     (moved, diagonal * largest)
 }
 
-/// Triangles oriented against the majority of their chart.
-fn flips(faces: &[FaceMeasures], topology: &UvTopology) -> usize {
+/// Which triangles are oriented against the majority of their chart.
+fn flips(faces: &[FaceMeasures], topology: &UvTopology) -> Vec<bool> {
     let sign = |f: usize| {
         if topology.against[f] { -faces[f].uv_double_area.signum() } else { faces[f].uv_double_area.signum() }
     };
@@ -370,8 +393,8 @@ fn flips(faces: &[FaceMeasures], topology: &UvTopology) -> usize {
         vote[topology.chart[f] as usize] += sign(f) * faces[f].area;
     }
     (0..faces.len())
-        .filter(|&f| faces[f].measured() && (sign(f) > 0.0) != (vote[topology.chart[f] as usize] >= 0.0))
-        .count()
+        .map(|f| faces[f].measured() && (sign(f) > 0.0) != (vote[topology.chart[f] as usize] >= 0.0))
+        .collect()
 }
 
 /// Fills in the figures that are means over measured triangles.

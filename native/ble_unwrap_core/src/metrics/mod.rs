@@ -16,8 +16,8 @@ mod uv_topology;
 
 pub(crate) use bent_quads::bent_quads;
 pub(crate) use layout_arrays::LayoutArrays;
-pub(crate) use measure::measure;
 pub use measure::{ChartMeasures, Measures};
+pub(crate) use measure::{TriangleMeasures, measure, measure_each};
 pub(crate) use uv_mesh::{Texture, TooManyTriangles, UvMesh};
 
 pub(crate) use box_tree::{Bounds, BoxTree, Visitor, in_batches};

@@ -1,5 +1,7 @@
 //! Pairs of UV triangles that share area.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use rayon::prelude::*;
 
 use crate::progress::{Cancelled, Progress};
@@ -43,7 +45,8 @@ impl Belonging {
     }
 }
 
-/// Counts pairs of triangles (either orientation) with more than `threshold` of common area; NaN has none.
+/// Counts pairs of triangles (either orientation) with more than `threshold` of common area, NaN has none, and says for
+/// each triangle whether it is in such a pair.
 ///
 /// Not exact: areas come from double-precision clipping. O(n log n + pairs), and a bounded number of
 /// pairs in any case (see [`Overlaps::complete`]).
@@ -55,7 +58,7 @@ pub(crate) fn overlaps(
     of: &[Belonging],
     threshold: f64,
     progress: &Progress,
-) -> Result<Overlaps, Cancelled> {
+) -> Result<(Overlaps, Vec<bool>), Cancelled> {
     let twice = |f: u32| {
         let [a, b, c] = triangles[f as usize];
         (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
@@ -70,6 +73,8 @@ pub(crate) fn overlaps(
         (if twice(f) < 0.0 { [c, b, a] } else { [a, b, c] }, of[f as usize])
     };
     let ordered: Vec<([[f64; 2]; 3], Belonging)> = (0..tree.len()).map(counter_clockwise).collect();
+    // Set in any order: which are set in the end is the same on any number of threads.
+    let involved: Vec<AtomicBool> = (0..ordered.len()).map(|_| AtomicBool::new(false)).collect();
     let mut state = (Overlaps { complete: true, ..Overlaps::default() }, 0u64);
     let total_budget = 100 * ordered.len() as u64 + 50_000_000;
     in_batches(
@@ -77,8 +82,15 @@ pub(crate) fn overlaps(
         progress,
         &mut state,
         |range, _| {
-            let mut c =
-                Counter { tree: &tree, ordered: &ordered, threshold, me: 0, seen: 0, found: Overlaps::default() };
+            let mut c = Counter {
+                tree: &tree,
+                ordered: &ordered,
+                involved: &involved,
+                threshold,
+                me: 0,
+                seen: 0,
+                found: Overlaps::default(),
+            };
             for position in range {
                 c.me = position;
                 if c.may_go_on() {
@@ -98,12 +110,18 @@ pub(crate) fn overlaps(
             go_on
         },
     )?;
-    Ok(state.0)
+    let mut overlapping = vec![false; triangles.len()];
+    for (position, involved) in involved.into_iter().enumerate() {
+        overlapping[large[tree.source(position)] as usize] = involved.into_inner();
+    }
+    Ok((state.0, overlapping))
 }
 
 struct Counter<'a> {
     tree: &'a BoxTree,
     ordered: &'a [([[f64; 2]; 3], Belonging)],
+    /// By position in the tree, whether a pair was found that the triangle is in.
+    involved: &'a [AtomicBool],
     threshold: f64,
     me: usize,
     seen: u64,
@@ -133,6 +151,9 @@ impl Visitor for Counter<'_> {
                 self.found.pairs += 1;
                 self.found.area += area;
                 self.found.between += u64::from(ga.group != gb.group);
+                for position in [self.me, position] {
+                    self.involved[position].store(true, Ordering::Relaxed);
+                }
             }
         }
         self.may_go_on()
@@ -249,8 +270,9 @@ mod tests {
             let t = random_triangles(n, size, n as u64);
             let group: Vec<u32> = (0..n as u32).map(|i| i % 3).collect();
             let of: Vec<Belonging> = group.iter().map(|&group| Belonging { group, stack: NONE }).collect();
-            let got = overlaps(&t, &of, 1e-9, &Progress::new()).expect("not cancelled");
+            let (got, involved) = overlaps(&t, &of, 1e-9, &Progress::new()).expect("not cancelled");
             let (mut pairs, mut between, mut area) = (0, 0, 0.0);
+            let mut expected = vec![false; n];
             for i in 0..n {
                 for j in 0..i {
                     let a = common_area(&ccw(&t[i]), &ccw(&t[j]));
@@ -258,12 +280,14 @@ mod tests {
                         pairs += 1;
                         area += a;
                         between += u64::from(group[i] != group[j]);
+                        (expected[i], expected[j]) = (true, true);
                     }
                 }
             }
             assert!(pairs > 0, "a test of nothing");
             assert_eq!((got.pairs, got.between, got.complete), (pairs, between, true));
             assert!((got.area - area).abs() < 1e-12);
+            assert_eq!(involved, expected);
         }
     }
 
@@ -284,14 +308,14 @@ mod tests {
                 ]
             })
             .collect();
-        let got = overlaps(&t, &vec![ALONE; t.len()], 1e-9, &Progress::new()).expect("not cancelled");
-        assert_eq!((got.pairs, got.complete), (0, true));
+        let (got, involved) = overlaps(&t, &vec![ALONE; t.len()], 1e-9, &Progress::new()).expect("not cancelled");
+        assert_eq!((got.pairs, got.complete, involved.contains(&true)), (0, true, false));
     }
 
     #[test]
     fn a_pile_of_equal_triangles_ends_and_says_so() {
         let t = vec![[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]; 60_000];
-        let got = overlaps(&t, &vec![ALONE; t.len()], 1e-9, &Progress::new()).expect("not cancelled");
+        let (got, _) = overlaps(&t, &vec![ALONE; t.len()], 1e-9, &Progress::new()).expect("not cancelled");
         assert!(!got.complete && got.pairs >= PAIR_LIMIT, "{got:?}");
     }
 
@@ -300,7 +324,7 @@ mod tests {
         let t = vec![[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]; 4];
         let count = |of: [[u32; 2]; 4]| {
             let of = of.map(|[group, stack]| Belonging { group, stack });
-            overlaps(&t, &of, 1e-9, &Progress::new()).expect("not cancelled").pairs
+            overlaps(&t, &of, 1e-9, &Progress::new()).expect("not cancelled").0.pairs
         };
         assert_eq!(count([[0, 7], [1, 7], [2, 7], [3, 7]]), 0);
         assert_eq!(count([[0, 7], [1, 7], [2, 7], [3, NONE]]), 3);

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use crate::error_kind::ErrorKind;
 use crate::mesh::{self, MeshError, MeshInput, Surface};
-use crate::metrics::{self, LayoutArrays, Measures, Texture, TooManyTriangles};
+use crate::metrics::{self, LayoutArrays, Measures, NONE, Texture, TooManyTriangles, TriangleMeasures};
 use crate::progress::{Cancelled, Progress, Stage};
 use crate::settings::Settings;
 use crate::verify::{Certificate, verify};
@@ -91,6 +91,47 @@ pub struct LayoutMeasures {
     pub bent_quads: usize,
     /// The measures of the triangulated faces. Faces with a vertex that is not finite are left out.
     pub measures: Measures,
+    /// What was found of each face.
+    pub by_face: FaceMeasures,
+}
+
+/// The measures of each face of a UV map.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct FaceMeasures {
+    /// Chart of each face, as [`Measures::per_chart`] has them; -1 for a face without UVs.
+    pub chart: Vec<i32>,
+    /// The faces of which a triangle is one of [`Measures::flips`], ascending.
+    pub flipped: Vec<usize>,
+    /// The faces of which a triangle is in a pair of [`Measures::overlaps`], ascending. Where that count is incomplete,
+    /// so is this list; of triangles of one stack that are the same it has one.
+    pub overlapping: Vec<usize>,
+    /// The faces of which a triangle is one of [`Measures::uv_degenerate_faces`], ascending.
+    pub collapsed: Vec<usize>,
+}
+
+impl FaceMeasures {
+    /// From what was found of the triangles, each of which is part of a face.
+    fn gathered(faces: usize, face_of: &[usize], triangles: &TriangleMeasures) -> Self {
+        let with = |has: &[bool]| {
+            let mut found: Vec<usize> = (0..face_of.len()).filter(|&t| has[t]).map(|t| face_of[t]).collect();
+            found.sort_unstable();
+            found.dedup();
+            found
+        };
+        let mut chart = vec![-1; faces];
+        for (t, &face) in face_of.iter().enumerate() {
+            if triangles.chart[t] != NONE {
+                chart[face] = triangles.chart[t] as i32;
+            }
+        }
+        Self {
+            chart,
+            flipped: with(&triangles.flipped),
+            overlapping: with(&triangles.overlapping),
+            collapsed: with(&triangles.collapsed),
+        }
+    }
 }
 
 /// Measures a UV map, whoever made it. `uv` holds one UV for each corner. `chart`, if given, holds one number for each
@@ -127,7 +168,7 @@ pub fn measure_layout(
     let (surface, label) = conditioned(input, uv, chart, stack, settings, progress)?;
     let arrays = LayoutArrays::new(input, &surface);
     let mesh = arrays.uv_mesh(uv, &label, Texture::of(&settings.packing))?.with_stacks(stack);
-    let measures = metrics::measure(&mesh, progress)?;
+    let (measures, triangles) = metrics::measure_each(&mesh, progress)?;
     let faces = input.face_offsets.len().saturating_sub(1);
     let mut mapped = vec![true; faces];
     for &p in &surface.unmapped {
@@ -139,7 +180,9 @@ pub fn measure_layout(
     }
     let bent_quads = metrics::bent_quads(input, uv, |face| mapped[face]).len();
     let unmapped_faces = mapped.iter().filter(|mapped| !**mapped).count();
-    Ok(LayoutMeasures { faces, unmapped_faces, bent_quads, measures })
+    let face_of: Vec<usize> = surface.mesh.faces().map(|f| surface.input_polygon(f)).collect();
+    let by_face = FaceMeasures::gathered(faces, &face_of, &triangles);
+    Ok(LayoutMeasures { faces, unmapped_faces, bent_quads, measures, by_face })
 }
 
 /// Checks a UV map exactly, whoever made it, by the same checks that [`unwrap`](crate::unwrap()) makes before it returns an
@@ -263,7 +306,25 @@ mod tests {
             assert!((m.l2 - 1.0).abs() < 1e-6 && (m.packing_efficiency - 0.08).abs() < 1e-6, "{m:?}");
             assert!((m.seam_length_absolute - 2.0).abs() < 1e-9, "{m:?}");
             assert!((m.gap_texels - 8.0).abs() < 1e-4, "beyond the search limit: {m:?}");
+            assert_eq!(layout.by_face.chart, [0, 1, -1]);
         }
+    }
+
+    #[test]
+    fn the_faces_that_are_at_fault_are_named() {
+        // The second square lies on a corner of the first one.
+        let mut uv = UV;
+        for (k, other) in [[0.2, 0.2], [0.4, 0.2], [0.4, 0.4], [0.2, 0.4]].into_iter().enumerate() {
+            uv[4 + k] = other;
+        }
+        let layout = measured(&uv, None).expect("a valid layout");
+        assert_eq!(layout.by_face.overlapping, [0, 1]);
+        assert!(layout.measures.overlaps > 0);
+        // A square that is nothing but a line.
+        uv[4..8].copy_from_slice(&[[0.6, 0.6], [0.8, 0.6], [0.8, 0.6], [0.6, 0.6]]);
+        let layout = measured(&uv, None).expect("a valid layout");
+        assert_eq!((layout.by_face.collapsed, layout.measures.uv_degenerate_faces), (vec![1], 2));
+        assert!(layout.by_face.flipped.is_empty() && layout.by_face.overlapping.is_empty());
     }
 
     #[test]

@@ -11,7 +11,7 @@ mod repack;
 pub use distances::{DistancesError, surface_distances};
 pub use flatten::{FlattenError, FlattenReport, Flattening, MapQuality, flatten};
 pub use graph::{CloudDistanceSettings, CloudDistancesError, Connect, cloud_distances};
-pub use layout::{LayoutError, LayoutMeasures, certify, measure_layout};
+pub use layout::{FaceMeasures, LayoutError, LayoutMeasures, certify, measure_layout};
 pub use repack::{RepackError, RepackRules, RepackScale, Repacked, repack};
 
 pub use crate::geodesics::{Connectivity, Piece};

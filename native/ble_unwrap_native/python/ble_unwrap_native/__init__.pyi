@@ -454,6 +454,7 @@ def measure(
     chart: Buffer | None = None,
     stacks: Buffer | None = None,
     corner_triangles: Buffer | None = None,
+    by_face: bool = False,
     job: Job | None = None,
     **settings: Unpack[_MeasureSettings],
 ) -> dict[str, Any]: ...

@@ -1,0 +1,111 @@
+"""What operators have in common that compute for long: a job on another thread, its progress, and Esc."""
+
+from .. import engine, mesh_bridge, preferences
+
+# The add-on's failures that are the user's business; anything else is a bug and may show its traceback.
+USER_ERRORS = (mesh_bridge.MeshError, engine.EngineMissing, engine.EngineError)
+
+POLL_SECONDS = 0.1
+CANCEL_POLLS = 100  # after Esc, wait at most this many polls for the worker before letting it go
+
+# While a job runs the view may be moved and zoomed; everything else waits, so that the mesh stays as it was read.
+PASSED_EVENTS = {
+    "MIDDLEMOUSE",
+    "MOUSEMOVE",
+    "INBETWEEN_MOUSEMOVE",
+    "WHEELUPMOUSE",
+    "WHEELDOWNMOUSE",
+    "TRACKPADPAN",
+    "TRACKPADZOOM",
+    "MOUSEROTATE",
+    "WINDOW_DEACTIVATE",
+}
+
+
+class WithProgress:
+    """An operator made of a `_prepare`, which reads, and a `_finish`, which writes what was computed in between.
+
+    `_prepare(context)` returns the work: it has an `element_count`, and computes at once by `run` or on another thread
+    by `start`. `_finish(context, work, result)` writes the result, reports and returns what an operator returns.
+    Whenever either raises one of `USER_ERRORS`, nothing has been changed.
+    """
+
+    def compute(self, context, *, in_background):
+        """Everything from reading to writing; `in_background` where the work is large and there are events to wait for.
+
+        Returns what the operator returns.
+        """
+        try:
+            work = self._prepare(context)
+            if not in_background or work.element_count < preferences.preference(context, "modal_threshold"):
+                return self._finish(context, work, work.run())
+            self._start(context, work)
+        except USER_ERRORS as error:
+            return self._fail(error)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "ESC" and event.value == "PRESS":
+            self._cancel_requested = True
+            self._job.cancel()
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"} if event.type in PASSED_EVENTS else {"RUNNING_MODAL"}
+        if self._cancel_requested:
+            self._cancel_polls += 1
+            if self._job.is_finished() or self._cancel_polls > CANCEL_POLLS:
+                self._stop(context)
+                return self._cancelled()
+            return {"RUNNING_MODAL"}
+        if not self._job.is_finished():
+            self._show_progress(context)
+            return {"RUNNING_MODAL"}
+        job = self._job
+        self._stop(context)
+        try:
+            return self._finish(context, self._running, job.result())
+        except engine.EngineCancelled:
+            return self._cancelled()
+        except USER_ERRORS as error:
+            return self._fail(error)
+
+    def cancel(self, context):
+        """Blender itself ends the operator: a file is loaded or the window closes."""
+        self._job.cancel()
+        self._stop(context)
+
+    def _start(self, context, work):
+        self._running = work
+        self._job = work.start()
+        self._cancel_requested = False
+        self._cancel_polls = 0
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(POLL_SECONDS, window=context.window)
+        manager.modal_handler_add(self)
+        manager.progress_begin(0, 100)
+        self._show_progress(context)
+
+    def _show_progress(self, context):
+        percent = int(100 * self._job.progress())
+        context.window_manager.progress_update(percent)
+        context.workspace.status_text_set(f"{self.bl_label}: {percent}%  {self._job.stage()}    [Esc] cancel")
+
+    def _stop(self, context):
+        context.window_manager.event_timer_remove(self._timer)
+        context.window_manager.progress_end()
+        context.workspace.status_text_set(None)
+
+    def _cancelled(self):
+        self.report({"WARNING"}, f"{self.bl_label}: cancelled, nothing was changed")
+        return {"CANCELLED"}
+
+    def _fail(self, error):
+        self.report({"ERROR"}, f"{self.bl_label}: {error}")
+        return {"CANCELLED"}
+
+
+def redraw(context):
+    """Shows new UVs and what was measured of them in every editor."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in {"IMAGE_EDITOR", "VIEW_3D"}:
+                area.tag_redraw()
