@@ -76,8 +76,9 @@ class _ChartsGroup(TypedDict, total=False):
     style: Literal["auto", "organic", "hard"]
     """Whether planes, cylinders and the like between hard edges keep their shape. "auto": Parts between hard edges that can lie flat without stretch do so if most of a connected piece is made of them, and so do planes and walls between bevels; else only large planes do. "organic": Hard edges are not treated specially. "hard": All parts between hard edges lie flat without stretch, but for thin rings that become strips, whatever the piece is made of; edges count as hard from 40° instead of 50°."""
     straighten: float
-    cover_price: float
     """How much seam a straight side along an axis of the texture is worth. Sides of charts that are straight on the surface are made straight, and thin rings become strips, where that costs less in stretch; 0 leaves them as they are."""
+    cover_price: float
+    """How much longer seams may get for a texture that is covered better: one or two charts that leave much of it empty are cut where their parts then lie closer together, if that makes all seams longer by at most so many per cent for each per cent of the texture; 0 cuts none for it."""
     moves: Literal["split", "join", "all"]
     """What the search for charts may do. "split": Patches are split until they keep the stretch limit. "join": Neighbouring charts are joined again where they keep the limit together. "all": Charts may be cut open, unfolded and joined along a part of their border, too."""
     holes: Literal["keep", "cut"]

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::cache::Run;
 use crate::charts::{Chart, Patch};
 use crate::flattening::{Rung, Rungs};
-use crate::mesh::{FaceId, HalfedgeId, TriMesh};
+use crate::mesh::{HalfedgeId, TriMesh};
 use crate::packing::PackSettings;
 use crate::progress::Cancelled;
 use crate::settings::Settings;
@@ -149,8 +149,8 @@ impl Search<'_> {
             let pieces = Rc::new(Pieces::new(&chart.patch, &chart.uv, may_be_cut));
             for lobe in pieces.lobes(MOST_LOBES) {
                 let cut = self.cut(chart, &lobe);
-                // What two lobes that meet in the mirror plane are taken off is the two halves of a face.
-                if cut.lobes == 2 && lobe.faces.iter().any(|f| self.is_at_plane(chart.patch.faces[f.index()])) {
+                // The symmetric part between two lobes is to be no smaller than these: else they are the two halves of a face.
+                if cut.lobes == 2 && self.is_mirrored_in_itself(chart, &lobe) && lobe.area > chart.patch.area() / 3.0 {
                     continue;
                 }
                 // No texture that holds the larger part is covered by more than this.
@@ -195,8 +195,12 @@ impl Search<'_> {
         !image.is_none() && image == self.cutting.mesh().twin(h)
     }
 
-    fn is_at_plane(&self, f: FaceId) -> bool {
-        f.halfedges().into_iter().any(|h| self.is_in_plane(h))
+    /// Whether the mirror image of a lobe is part of the same chart.
+    fn is_mirrored_in_itself(&self, chart: &Chart, lobe: &Lobe) -> bool {
+        let image = lobe.border.first().map(|&h| self.images[surface(chart, h).index()]).filter(|h| !h.is_none());
+        image.is_some_and(|h| {
+            self.cutting.owner(h.face()) == self.cutting.owner(chart.patch.faces[lobe.faces[0].index()])
+        })
     }
 
     /// The share of a texture that can be covered if it holds a lobe and the rest of its chart.
@@ -271,7 +275,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::mesh::test_surfaces;
+    use crate::mesh::{FaceId, test_surfaces};
     use crate::progress::Progress;
 
     /// A square of 16 by 16 quads in two charts: one has those for which `is_first` holds, by column and row.
