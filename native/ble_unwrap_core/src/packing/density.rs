@@ -14,6 +14,7 @@ use super::refine::Refinement;
 use super::search::Search;
 use super::shape::SAFETY_TEXELS;
 use super::sketch::{Sketch, Spot, growth, most_promising};
+use super::tighten::{Tightening, Trying};
 use super::{Constraints, PackError, PackSettings, Quality, Rotation};
 use crate::progress::{Cancelled, Progress};
 
@@ -33,6 +34,8 @@ const FIRST_FILL: f64 = 0.8;
 const BEGINNINGS: &[f64] = &[1.0, 0.9];
 /// That of a second search, with more angles. One beginning brings it nearly all that two bring.
 const OTHER_BEGINNINGS: &[f64] = &[0.95];
+/// From so many charts on each search has one beginning.
+const CROWDED: usize = 50;
 /// Vertices of outlines are moved together on a lattice of so many cells of the coarse grid.
 const COARSENED: f64 = 0.3;
 /// A scale that differs from the given one by less than this share has it: only rounding sets them apart.
@@ -74,16 +77,14 @@ impl Effort {
         };
         // A few charts have few orders and many poses, and an attempt costs next to nothing.
         let attempts = |all: usize, least, most| (all / charts.max(1)).clamp(least, most);
-        let fast = Self { attempts: attempts(600, 30, 60), sketches: 3, angles: FEW_ANGLES, ..grid };
+        // Many charts are tightened to about the same density from wherever the search ends.
+        let beginnings = if charts < CROWDED { BEGINNINGS } else { OTHER_BEGINNINGS };
+        let fast = Self { attempts: attempts(1200, 16, 60), sketches: 1, angles: FEW_ANGLES, beginnings, ..grid };
         match quality {
             Quality::Fast => vec![fast],
             // What is found first is never lost, so that more effort brings no less.
             Quality::Normal => vec![fast, Self { angles: ANGLES, beginnings: OTHER_BEGINNINGS, ..fast }],
-            Quality::High => {
-                let (attempts, sketches) = (attempts(20_000, 80, 400), 16);
-                let finer = Self { across: 50.0, least: 384.0, most: 2048.0, attempts, sketches, ..grid };
-                vec![Self { attempts, sketches, ..grid }, finer]
-            }
+            Quality::High => vec![Self { attempts: attempts(8000, 30, 400), sketches: 4, ..grid }],
         }
     }
 }
@@ -187,6 +188,9 @@ pub(super) fn densest_up_to(
     }
     let obstacles = obstacles.as_ref();
     let mut refined = None;
+    let trying = Trying::new(n, settings.quality);
+    // All sketches, those that are not refined as well: where to start from when charts are tightened.
+    let mut drawn: Vec<Sketch> = Vec::new();
     // Where what was thought enough turns out to be too little, all is searched.
     for enough in [if stops_early { SURE * most } else { f64::INFINITY }, f64::INFINITY] {
         let mut sketches: Vec<Sketch> = Vec::new();
@@ -222,6 +226,7 @@ pub(super) fn densest_up_to(
                     break;
                 }
             }
+            drawn.extend(found.iter().cloned());
             sketches.extend(most_promising(found, effort.sketches));
             if sketches.iter().any(|sketch| sketch.density >= enough) {
                 break;
@@ -238,6 +243,12 @@ pub(super) fn densest_up_to(
     }
     let denser = |a: Dense, b: Dense| if b.density > a.density { b } else { a };
     if let Some(dense) = refined.into_iter().chain(in_rows).reduce(denser) {
+        // Tiles are brought to one density afterwards, which a tightened one may not allow; and charts grow into obstacles.
+        if obstacles.is_none() && !stops_early {
+            let tightening = Tightening { outlines, grid, ceiling, settings, progress };
+            let sketches = most_promising(drawn, trying.sketches);
+            return Ok((tightening.densest(dense, &sketches, trying)?, trials));
+        }
         return Ok((dense, trials));
     }
     // More charts than the coarse grid holds, or a texture of a few texels.

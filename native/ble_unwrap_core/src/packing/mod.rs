@@ -42,6 +42,8 @@
 //! order of placement).
 
 mod alone;
+mod body;
+mod compact;
 #[cfg(test)]
 mod constrained_tests;
 mod constraints;
@@ -49,6 +51,7 @@ mod cover;
 mod density;
 mod goal;
 mod grid;
+mod linear_program;
 mod many;
 mod mask;
 mod mip_margin;
@@ -60,6 +63,7 @@ mod place;
 mod placement;
 mod pose;
 mod raster;
+mod rearrange;
 mod refine;
 mod search;
 mod settle;
@@ -72,6 +76,7 @@ mod snap;
 mod spread;
 #[cfg(test)]
 mod tests;
+mod tighten;
 mod tile;
 #[cfg(test)]
 mod tiled_tests;
