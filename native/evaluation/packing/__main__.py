@@ -3,9 +3,9 @@
 python native/evaluation/packing [MODEL ...] [--packers ours xatlas sparrow blender] [--keep DIRECTORY] [--seconds 20]
 
 The islands are the charts of our own atlases (at the default limit on stretch and at a tight one) and of xatlas's, of
-models given as .obj, .ply or .ply.gz, else of generated meshes. All packers get the same islands; two islands are to be
-2 texels apart and 1 from the border, in a square of 1024. Every result is checked by GEOS, whatever its packer says; one
-that keeps less does not count. CPU seconds are those of one thread, for packers that have to be asked several times
+models given as .obj, .ply or .ply.gz, else of generated meshes. All packers get the same islands; two are to be
+2 texels apart and 1 from the border, in a square of 1024. Every result is checked by GEOS, whatever its packer says;
+one that keeps less does not count. CPU seconds are those of one thread, for packers that have to be asked several times
 those of the best one. Sparrow gets `--seconds` a set, in all. `--keep` stores the islands, so that two versions of the
 packer see the same ones. Exit code 1: a result of our own does not keep the distance.
 """
@@ -27,8 +27,8 @@ def stored(options):
     names = "-".join(Path(model).name.split(".")[0] for model in options.models) or "generated"
     kept = Path(options.keep) / f"{names[:80]}.islands" if options.keep else None
     if kept and kept.is_file():
-        return pickle.loads(kept.read_bytes())  # noqa: S301: our own file
-    found = list(islands.made(islands.sets(options.models, options.most), options.most))
+        return pickle.loads(kept.read_bytes())
+    found = list(islands.made(islands.sets(options.models), options.most))
     if kept:
         kept.parent.mkdir(parents=True, exist_ok=True)
         kept.write_bytes(pickle.dumps(found))
@@ -38,7 +38,7 @@ def stored(options):
 def main():
     parser = argparse.ArgumentParser(prog="packing", description="Packers compared on the same islands.")
     parser.add_argument("models", nargs="*", metavar="MODEL", help=".obj, .ply or .ply.gz instead of generated meshes")
-    parser.add_argument("--packers", nargs="+", default=[], help="beginnings of names; all that are installed otherwise")
+    parser.add_argument("--packers", nargs="+", default=[], help="beginnings of names, else all that are installed")
     parser.add_argument("--seconds", type=float, default=20, help="of sparrow, a set (default: %(default)s)")
     parser.add_argument("--most", type=int, default=islands.MOST_ISLANDS, help="islands a set (default: %(default)s)")
     parser.add_argument("--least", type=int, default=1, help="islands a set (default: %(default)s)")

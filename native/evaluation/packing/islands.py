@@ -1,5 +1,6 @@
 """What `make packing` packs: the charts of our own atlases and of xatlas's, as flat triangles, a set an atlas."""
 
+import functools
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -116,14 +117,14 @@ def _pieces(triangles, points):
     return np.unique(label[triangles[:, 0]], return_inverse=True)[1]
 
 
-def sets(models, most):
+def sets(models):
     """Sets of islands one by one, of models given as files or else of generated meshes."""
     todo = [(Path(path).name.split(".")[0], lambda path=path: scaling_meshes.read(path)) for path in models]
     for name, make in todo or quality_meshes.GENERATED.items():
         mesh = make()
         for limit in LIMITS:
-            yield f"{name}, ours" + (f" at {limit}" if limit else ""), lambda limit=limit: of_our_atlas(mesh, limit)
-        yield f"{name}, xatlas's", lambda: of_xatlas(mesh)
+            yield f"{name}, ours" + (f" at {limit}" if limit else ""), functools.partial(of_our_atlas, mesh, limit)
+        yield f"{name}, xatlas's", functools.partial(of_xatlas, mesh)
 
 
 def made(todo, most):

@@ -18,7 +18,7 @@ def scaled_to_square(placed):
 
 
 def least_gap(islands, placed):
-    """Least distance of two islands, 0 where two overlap; infinite for one. Only what is below twice the margin is exact."""
+    """Least distance of two islands, 0 where two overlap, infinite where none are nearer than twice the margin."""
     shapes = [_shape(island, points) for island, points in zip(islands, placed, strict=True)]
     borders = shapely.boundary(np.array(shapes, dtype=object))
     tree = shapely.STRtree(borders)

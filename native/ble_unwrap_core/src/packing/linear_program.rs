@@ -84,7 +84,7 @@ impl Sides {
     }
 
     fn advance(&mut self, step: f64, by: &Self) {
-        let mut one = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a += step * b);
+        let one = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a += step * b);
         one(&mut self.rows, &by.rows);
         one(&mut self.low, &by.low);
         one(&mut self.high, &by.high);
