@@ -187,10 +187,9 @@ def blender(method):
 
 def available(names, seconds):
     """{name: packer} of those that are asked for and can be imported; says which cannot."""
+    own = [(quality, rotation) for quality in ("fast", "normal", "high") for rotation in ("any", "quarter")]
     makers = {
-        **{
-            f"ours {q} {r}": lambda q=q, r=r: ours(q, r) for q in ("fast", "normal", "high") for r in ("any", "quarter")
-        },
+        **{f"ours {quality} {rotation}": functools.partial(ours, quality, rotation) for quality, rotation in own},
         "xatlas": lambda: of_xatlas(False),
         "xatlas brute": lambda: of_xatlas(True),
         "sparrow": lambda: sparrow(seconds),
