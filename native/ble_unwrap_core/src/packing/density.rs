@@ -34,8 +34,6 @@ const FIRST_FILL: f64 = 0.8;
 const BEGINNINGS: &[f64] = &[1.0, 0.9];
 /// That of a second search, with more angles. One beginning brings it nearly all that two bring.
 const OTHER_BEGINNINGS: &[f64] = &[0.95];
-/// From so many charts on each search has one beginning.
-const CROWDED: usize = 50;
 /// Vertices of outlines are moved together on a lattice of so many cells of the coarse grid.
 const COARSENED: f64 = 0.3;
 /// A scale that differs from the given one by less than this share has it: only rounding sets them apart.
@@ -77,9 +75,7 @@ impl Effort {
         };
         // A few charts have few orders and many poses, and an attempt costs next to nothing.
         let attempts = |all: usize, least, most| (all / charts.max(1)).clamp(least, most);
-        // Many charts are tightened to about the same density from wherever the search ends.
-        let beginnings = if charts < CROWDED { BEGINNINGS } else { OTHER_BEGINNINGS };
-        let fast = Self { attempts: attempts(1200, 16, 60), sketches: 1, angles: FEW_ANGLES, beginnings, ..grid };
+        let fast = Self { attempts: attempts(600, 30, 60), sketches: 3, angles: FEW_ANGLES, ..grid };
         match quality {
             Quality::Fast => vec![fast],
             // What is found first is never lost, so that more effort brings no less.

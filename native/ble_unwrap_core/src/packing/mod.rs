@@ -520,7 +520,7 @@ fn require_memory(items: &[PackItem<'_>]) -> Result<(), Cancelled> {
 ///
 /// An item without triangles gets a pose in the middle of the texture and takes no room.
 ///
-/// Cost: O(t log t) for t triangles, then a bounded number of attempts on the coarse grid (16 to 60 from each
+/// Cost: O(t log t) for t triangles, then a bounded number of attempts on the coarse grid (30 to 60 from each
 /// beginning once one fits, `Fast`), of placements on the fine one (about a dozen), and of steps along outlines (10 to 90 a start). Measured on two cores: 0.05 to 0.1 s for
 /// 2 to 40 charts, 0.2 to 0.3 s for 170. Attempts and rasters run in parallel. A single chart is fitted without a search.
 /// Thousands of charts are placed in rows, in O(n log n): 50,000 in half a second, a million in six.
