@@ -40,6 +40,8 @@ const COARSENED: f64 = 0.3;
 pub(super) const SAME_SCALE: f64 = 1e-9;
 /// A sketch so many times denser than needed is expected to have room for all charts on the fine grid at the density needed.
 const SURE: f64 = 1.03;
+/// Charts placed at this share of the density that is needed may get all of it once they are tightened.
+const NEARLY: f64 = 0.94;
 /// Attempts of the search on the fine grid, where no sketch could be refined.
 const LAST_RESORT: usize = 10;
 
@@ -239,11 +241,15 @@ pub(super) fn densest_up_to(
     }
     let denser = |a: Dense, b: Dense| if b.density > a.density { b } else { a };
     if let Some(dense) = refined.into_iter().chain(in_rows).reduce(denser) {
-        // Tiles are brought to one density afterwards, which a tightened one may not allow; and charts grow into obstacles.
-        if obstacles.is_none() && !stops_early {
+        // Of several tiles all are brought to one density afterwards, near where charts are, which only a placement by cells is sure to allow.
+        // So there only what then has the density that is needed is taken. And charts would grow into obstacles.
+        let is_near = !stops_early || (NEARLY * ceiling..ceiling).contains(&dense.density);
+        if obstacles.is_none() && is_near {
             let tightening = Tightening { outlines, grid, ceiling, settings, progress };
             let sketches = most_promising(drawn, trying.sketches);
-            return Ok((tightening.densest(dense, &sketches, trying)?, trials));
+            let tightened = tightening.densest(dense.clone(), &sketches, trying)?;
+            let is_taken = !stops_early || tightened.density >= ceiling;
+            return Ok((if is_taken { tightened } else { dense }, trials));
         }
         return Ok((dense, trials));
     }
