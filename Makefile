@@ -3,13 +3,15 @@
 # make settings  what README, type stub, documentation and add-on say of the settings, from the core's table
 # make bench  times of the stages; make flamegraph where the time of one unwrap goes; make scaling time and memory against faces
 # make quality  charts, stretch, seams, packing and CPU seconds over shuffled triangulations: for before and after a change
+# make packing  what share of a square packers cover with the same islands: ours, xatlas's, sparrow, Blender's where they are installed
 # make shapes  boxes, bottles, gears and other common shapes, their layouts and seams drawn to be looked at: out/shapes.png
 # make contact-sheet  every model under a checker beside its layout, in one picture: out/contact_sheet.png
 # make paper  the paper's figures and its comparison with Isomap, measured anew: out/paper/; make paper-page the same, and
 #             brings the page in native/paper up to date, of the last commit
 # Knobs: PYTHON (3.11 or later), CARGO, MESH=file for the demo and the flame graph (.obj), BLENDER=/path/to/blender for a
 # real one instead of bpy, MODELS="a.obj b.obj" for the paper's figure 3 and its table, for the scaling and the quality (.ply,
-# .ply.gz, too), for the shapes and for the contact sheet, COMPARE=smart for a third picture a model there, SHUFFLES=4 for the quality.
+# .ply.gz, too), for the packing, the shapes and the contact sheet, COMPARE=smart for a third picture a model there, SHUFFLES=4 for the quality,
+# PACKERS="ours xatlas" and SECONDS=60 (of sparrow, a set) for the packing.
 
 PYTHON ?= python3
 CARGO ?= cargo
@@ -20,7 +22,7 @@ CRATES := native/ble_unwrap_core native/ble_unwrap_native
 # What the wheel is made of. Official Blender runs on glibc 2.28, which zig links against on any newer system.
 NATIVE := Cargo.toml Cargo.lock .ci/build_wheel .ci/third_party_licenses $(shell find $(CRATES) -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name settings.txt 2>/dev/null)
 
-.PHONY: test test-rust test-python test-blender settings bench flamegraph scaling quality shapes contact-sheet lint format venv wheel zip demo \
+.PHONY: test test-rust test-python test-blender settings bench flamegraph scaling quality packing shapes contact-sheet lint format venv wheel zip demo \
 	paper paper-page clean
 
 test: test-rust lint test-python test-blender
@@ -49,6 +51,9 @@ scaling: $(VENV)/.wheel $(VENV)/.scaling
 
 quality: $(VENV)/.wheel
 	$(BIN)/python native/evaluation/quality $(MODELS) $(if $(SHUFFLES),--shuffles $(SHUFFLES))
+
+packing: $(VENV)/.wheel $(VENV)/.packing
+	$(BIN)/python native/evaluation/packing $(MODELS) $(if $(PACKERS),--packers $(PACKERS)) $(if $(SECONDS),--seconds $(SECONDS))
 
 shapes: $(VENV)/.wheel
 	$(BIN)/python native/evaluation/shapes $(MODELS)
@@ -105,6 +110,10 @@ $(VENV)/.paper: native/paper/requirements.txt $(VENV)/.ready
 
 $(VENV)/.scaling: native/evaluation/scaling/requirements.txt $(VENV)/.ready
 	$(BIN)/pip install --quiet --disable-pip-version-check -r native/evaluation/scaling/requirements.txt
+	touch $@
+
+$(VENV)/.packing: native/evaluation/packing/requirements.txt $(VENV)/.ready
+	$(BIN)/pip install --quiet --disable-pip-version-check -r native/evaluation/packing/requirements.txt
 	touch $@
 
 $(WHEELS)/.built: $(NATIVE) $(VENV)/.ready

@@ -14,6 +14,7 @@ use super::refine::Refinement;
 use super::search::Search;
 use super::shape::SAFETY_TEXELS;
 use super::sketch::{Sketch, Spot, growth, most_promising};
+use super::tighten::{Tightening, Trying};
 use super::{Constraints, PackError, PackSettings, Quality, Rotation};
 use crate::progress::{Cancelled, Progress};
 
@@ -39,6 +40,8 @@ const COARSENED: f64 = 0.3;
 pub(super) const SAME_SCALE: f64 = 1e-9;
 /// A sketch so many times denser than needed is expected to have room for all charts on the fine grid at the density needed.
 const SURE: f64 = 1.03;
+/// Charts placed at this share of the density that is needed may get all of it once they are tightened.
+const NEARLY: f64 = 0.94;
 /// Attempts of the search on the fine grid, where no sketch could be refined.
 const LAST_RESORT: usize = 10;
 
@@ -79,11 +82,7 @@ impl Effort {
             Quality::Fast => vec![fast],
             // What is found first is never lost, so that more effort brings no less.
             Quality::Normal => vec![fast, Self { angles: ANGLES, beginnings: OTHER_BEGINNINGS, ..fast }],
-            Quality::High => {
-                let (attempts, sketches) = (attempts(20_000, 80, 400), 16);
-                let finer = Self { across: 50.0, least: 384.0, most: 2048.0, attempts, sketches, ..grid };
-                vec![Self { attempts, sketches, ..grid }, finer]
-            }
+            Quality::High => vec![Self { attempts: attempts(8000, 30, 400), sketches: 4, ..grid }],
         }
     }
 }
@@ -187,6 +186,9 @@ pub(super) fn densest_up_to(
     }
     let obstacles = obstacles.as_ref();
     let mut refined = None;
+    let trying = Trying::new(n, settings.quality);
+    // All sketches, those that are not refined as well: where to start from when charts are tightened.
+    let mut drawn: Vec<Sketch> = Vec::new();
     // Where what was thought enough turns out to be too little, all is searched.
     for enough in [if stops_early { SURE * most } else { f64::INFINITY }, f64::INFINITY] {
         let mut sketches: Vec<Sketch> = Vec::new();
@@ -222,6 +224,7 @@ pub(super) fn densest_up_to(
                     break;
                 }
             }
+            drawn.extend(found.iter().cloned());
             sketches.extend(most_promising(found, effort.sketches));
             if sketches.iter().any(|sketch| sketch.density >= enough) {
                 break;
@@ -238,6 +241,16 @@ pub(super) fn densest_up_to(
     }
     let denser = |a: Dense, b: Dense| if b.density > a.density { b } else { a };
     if let Some(dense) = refined.into_iter().chain(in_rows).reduce(denser) {
+        // Of several tiles all are brought to one density afterwards, near where charts are, which only a placement by cells is sure to allow.
+        // So there only what then has the density that is needed is taken. And charts would grow into obstacles.
+        let is_near = !stops_early || (NEARLY * ceiling..ceiling).contains(&dense.density);
+        if obstacles.is_none() && is_near {
+            let tightening = Tightening { outlines, grid, ceiling, settings, progress };
+            let sketches = most_promising(drawn, trying.sketches);
+            let tightened = tightening.densest(dense.clone(), &sketches, trying)?;
+            let is_taken = !stops_early || tightened.density >= ceiling;
+            return Ok((if is_taken { tightened } else { dense }, trials));
+        }
         return Ok((dense, trials));
     }
     // More charts than the coarse grid holds, or a texture of a few texels.

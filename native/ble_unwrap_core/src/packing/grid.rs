@@ -3,11 +3,14 @@
 use nalgebra::{Point2, Vector2};
 
 use super::occupancy::Occupancy;
-use super::{PackSettings, Pose, Quality};
+use super::{PackSettings, Pose};
 
 /// Cells across the square each chart would have if all were equal: the raster then wastes about 2 %
 /// of the texture. Finer grids gain half of that for twice the time.
 const CELLS_ACROSS: f64 = 70.0;
+/// Least and most of them across the texture.
+const LEAST_ACROSS: f64 = 1024.0;
+const MOST_ACROSS: f64 = 2048.0;
 /// Texels a cell at the finest.
 const FINEST: f64 = 0.25;
 
@@ -35,11 +38,7 @@ impl Grid {
         let (width, height) = (f64::from(settings.width), f64::from(settings.height));
         let (shorter, longer) = (width.min(height), width.max(height));
         let margin = settings.margin_texels;
-        let (least, most) = match settings.quality {
-            Quality::Fast | Quality::Normal => (1024.0, 2048.0),
-            Quality::High => (2048.0, Occupancy::WIDEST as f64),
-        };
-        let across = (CELLS_ACROSS * (charts as f64).sqrt()).clamp(least, most);
+        let across = (CELLS_ACROSS * (charts as f64).sqrt()).clamp(LEAST_ACROSS, MOST_ACROSS);
         let mut cell = (longer / across).max(FINEST);
         if margin >= cell {
             cell = margin / (margin / cell - 1e-9).ceil();

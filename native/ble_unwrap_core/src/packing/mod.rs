@@ -24,12 +24,15 @@
 //!    placement and choices of poses. Every attempt about as high as the texture is a `sketch`.
 //! 7. `settle`, `refine`: the few densest sketches on the fine grid, each chart in its one pose and a
 //!    small window around its place, grown until they no longer fit. Here the guarantee is made.
-//! 8. `many`, `shelves`: thousands of charts as boxes in rows around the large ones among them.
-//! 9. `density` is the whole of it for one texture; `alone` a single chart, where there is nothing to search.
-//! 10. `spread`, for several tiles or a density that is given: which chart goes into which tile, each of which is packed by 1 to 9.
+//! 8. `tighten`: up to some hundred charts are then pressed together along their outlines (`body`), moved and turned by
+//!    any amount, in steps each of which is a linear program (`compact`, `linear_program`): from the placement, from
+//!    further sketches, and from variations of what was found (`rearrange`).
+//! 9. `many`, `shelves`: thousands of charts as boxes in rows around the large ones among them.
+//! 10. `density` is the whole of it for one texture; `alone` a single chart, where there is nothing to search.
+//! 11. `spread`, for several tiles or a density that is given: which chart goes into which tile, each of which is packed by 1 to 10, but for 8.
 //!     `tile` says where tiles lie, `shortfall` what the user is told of a density that does not fit.
-//! 11. `rough` tells about how much will be covered, for a fraction of the cost.
-//! 12. `snap`: at last rectangles are laid on whole texels, where that is asked for.
+//! 12. `rough` tells about how much will be covered, for a fraction of the cost.
+//! 13. `snap`: at last rectangles are laid on whole texels, where that is asked for.
 //!
 //! `constraints` are what a caller may ask for in addition. `obstacles` are cells that are occupied from the start, by the same raster
 //! and the same distance between cells, so that the guarantee holds for them as it does between charts. `mip_margin`
@@ -43,6 +46,8 @@
 //! order of placement).
 
 mod alone;
+mod body;
+mod compact;
 #[cfg(test)]
 mod constrained_tests;
 mod constraints;
@@ -50,6 +55,7 @@ mod cover;
 mod density;
 mod goal;
 mod grid;
+mod linear_program;
 mod many;
 mod mask;
 mod mip_margin;
@@ -61,6 +67,7 @@ mod place;
 mod placement;
 mod pose;
 mod raster;
+mod rearrange;
 mod refine;
 mod rough;
 mod search;
@@ -74,6 +81,7 @@ mod snap;
 mod spread;
 #[cfg(test)]
 mod tests;
+mod tighten;
 mod tile;
 #[cfg(test)]
 mod tiled_tests;
@@ -125,27 +133,27 @@ choices!(Rotation {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Quality {
-    /// Takes a twentieth of a second for up to some dozen charts, and a fifth of a second for some hundred.
+    /// Takes a twentieth to a tenth of a second for up to some dozen charts, and a fifth to a third of a second for some hundred.
     Fast,
-    /// Takes up to twice as long. What `Fast` does is followed by a second search in which the larger charts are tried at twice as many angles, and boxes
-    /// in rows are tried as well.
+    /// Takes two to four times as long. What `Fast` does is followed by a second search in which the larger charts are tried at twice as many
+    /// angles, boxes in rows are tried as well, and up to some dozen charts are arranged in other ways and pressed together again.
     Normal,
-    /// Takes ten to twenty times as long as `Fast`, on finer grids, with the angles and rows of `Normal`. Of 8,000 charts and more only the largest
-    /// are placed by their shapes, and the others as boxes in rows, whatever the quality.
+    /// Takes ten to twenty times as long as `Fast`, one to three seconds: many more sketches and arrangements are tried, at the angles and with the
+    /// rows of `Normal`. Of 8,000 charts and more only the largest are placed by their shapes, and the others as boxes in rows, whatever the quality.
     High,
 }
 
 choices!(Quality {
     Fast: "fast", "Fast", "A fraction of a second for up to some hundred charts.";
-    Normal: "normal", "Normal", "Up to twice as long; charts turned by any angle are tried at more angles.";
-    High: "high", "High", "Ten to twenty times as long, on finer grids.";
+    Normal: "normal", "Normal", "Two to four times as long; more angles and arrangements are tried.";
+    High: "high", "High", "Ten to twenty times as long, with many more arrangements tried.";
 });
 
 /// How charts are packed, and into which texture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PackSettings {
     /// Least distance between two charts in texels; half of it is kept to the border of the texture. At least 0; with 0,
-    /// charts may all but touch (a 64th of a texel stays between them).
+    /// charts may all but touch (a 128th of a texel stays between them).
     pub margin_texels: f64,
     /// Width of the texture in texels, 1 to [`PackSettings::LARGEST_SIZE`].
     pub width: u32,
@@ -515,8 +523,8 @@ fn require_memory(items: &[PackItem<'_>]) -> Result<(), Cancelled> {
 ///
 /// An item without triangles gets a pose in the middle of the texture and takes no room.
 ///
-/// Cost: O(t log t) for t triangles, then a bounded number of attempts on the coarse grid (twice 40 to 80 once
-/// one fits, `Fast`) and of placements on the fine one (a dozen or two). Measured on two cores: 0.05 to 0.1 s for
+/// Cost: O(t log t) for t triangles, then a bounded number of attempts on the coarse grid (30 to 60 from each
+/// beginning once one fits, `Fast`), of placements on the fine one (about a dozen), and of steps along outlines (10 to 90 a start). Measured on two cores: 0.05 to 0.1 s for
 /// 2 to 40 charts, 0.2 to 0.3 s for 170. Attempts and rasters run in parallel. A single chart is fitted without a search.
 /// Thousands of charts are placed in rows, in O(n log n): 50,000 in half a second, a million in six.
 ///

@@ -7,9 +7,6 @@ use nalgebra::{Point2, Vector2};
 use super::Rotation;
 use super::outline::{Edge, Outline};
 
-/// Angles compared for a chart alone in the texture, over half a turn.
-const ALONE: usize = 720;
-
 /// A chart is laid along the axes where more than this share of its border then lies along them: an octagon has half, a triangle of equal
 /// sides a third, what has grown a twentieth.
 const ALIGNED: f64 = 0.25;
@@ -42,6 +39,15 @@ pub(super) fn base_turns(outline: &Outline, rotation: Rotation, angles: usize) -
         [first[0] * c - first[1] * s, first[1] * c + first[0] * s]
     };
     std::iter::once(first).chain((1..angles).map(turned)).collect()
+}
+
+/// Whether a chart keeps the angles that [`base_turns`] gives it, but for quarter turns.
+pub(super) fn keeps_turn(outline: &Outline, rotation: Rotation) -> bool {
+    match rotation {
+        Rotation::Aligned => aligned_turn(outline).or_else(|| symmetric_turn(outline)).is_some(),
+        Rotation::Any => false,
+        Rotation::Quarter | Rotation::None => true,
+    }
 }
 
 /// The turn that lays as much of an outline's border along the axes as can be, where that is much of it. O(n log n).
@@ -125,30 +131,52 @@ fn distance(p: Point2<f64>, [from, to]: [Point2<f64>; 2]) -> f64 {
     if share.is_nan() { at.norm() } else { (at - side * share).norm() }
 }
 
-/// The turn in which a chart alone fits a rectangle of `inner` width and height at the largest scale:
-/// the minimum-area rectangle's or the best of half a turn in quarters of a degree.
+/// The turn in which a chart alone fits a rectangle of `inner` width and height at the largest scale, exactly.
+///
+/// Between two angles at which a side of the convex hull is along an axis, width and height are each the distance of two
+/// corners along an axis, a concave function of the angle. The larger of the two, each relative to its room, is therefore
+/// least at such an angle, or where both are equal. O(h²) for the h corners of the hull.
 pub(super) fn turn_alone(outline: &Outline, inner: [f64; 2]) -> [f64; 2] {
     let hull = convex_hull(&outline.points);
-    let scale = |[c, s]: [f64; 2]| {
-        let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
-        for p in &hull {
-            let at = [c * p.x - s * p.y, s * p.x + c * p.y];
-            for k in 0..2 {
-                (low[k], high[k]) = (low[k].min(at[k]), high[k].max(at[k]));
-            }
-        }
-        (inner[0] / (high[0] - low[0])).min(inner[1] / (high[1] - low[1]))
+    let n = hull.len();
+    let turned = |[c, s]: [f64; 2], p: &Point2<f64>| [c * p.x - s * p.y, s * p.x + c * p.y];
+    // The corners that are least and greatest along each axis.
+    let ends = |turn: [f64; 2]| {
+        [0, 1].map(|k| {
+            let along = |i: &usize| turned(turn, &hull[*i])[k];
+            let least = (0..n).reduce(|a, b| if along(&b) < along(&a) { b } else { a });
+            let greatest = (0..n).reduce(|a, b| if along(&b) > along(&a) { b } else { a });
+            least.zip(greatest).map_or(Vector2::zeros(), |(a, b)| hull[b] - hull[a])
+        })
     };
-    let [c, s] = flat_turn(outline);
-    let half_turn = (0..ALONE).map(|k| {
-        let (sin, cos) = (k as f64 * PI / ALONE as f64).sin_cos();
-        [c * cos - s * sin, s * cos + c * sin]
-    });
-    let mut best = (scale([c, s]), [c, s]);
-    for turn in half_turn {
+    let scale = |turn: [f64; 2]| {
+        let [across, up] = ends(turn).map(Point2::from);
+        (inner[0] / turned(turn, &across)[0]).min(inner[1] / turned(turn, &up)[1])
+    };
+    let side = |k: usize| hull[(k + 1) % n] - hull[k];
+    let quarters = |angle: f64| [angle.rem_euclid(PI), (angle + FRAC_PI_2).rem_euclid(PI)];
+    let mut angles: Vec<f64> = (0..n).flat_map(|k| quarters(-side(k).y.atan2(side(k).x))).collect();
+    angles.sort_unstable_by(f64::total_cmp);
+    angles.dedup();
+    let flat = flat_turn(outline);
+    let mut best = (scale(flat), flat);
+    let mut try_turn = |turn: [f64; 2]| {
         let scale = scale(turn);
         if scale > best.0 * (1.0 + 1e-9) {
             best = (scale, turn);
+        }
+    };
+    for (k, &angle) in angles.iter().enumerate() {
+        let (s, c) = angle.sin_cos();
+        try_turn([c, s]);
+        let next = angles.get(k + 1).copied().unwrap_or(angles[0] + PI);
+        let (s, c) = (0.5 * (angle + next)).sin_cos();
+        let [across, up] = ends([c, s]);
+        // Where (cos across.x - sin across.y) / inner.0 is (sin up.x + cos up.y) / inner.1.
+        let equal = [inner[1] * across.y + inner[0] * up.x, inner[1] * across.x - inner[0] * up.y];
+        let length = equal[0].hypot(equal[1]);
+        if length > 0.0 {
+            try_turn(equal.map(|x| x / length));
         }
     }
     best.1

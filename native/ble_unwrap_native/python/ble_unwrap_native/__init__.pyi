@@ -174,7 +174,7 @@ class _PackingGroup(TypedDict, total=False):
     rotation: Literal["aligned", "any", "quarter", "none"]
     """How charts may be turned when they are packed. "aligned": Charts with straight borders lie along the axes, symmetric ones upright or level, others at any angle. "any": Charts are turned by any angle, which packs tightest. "quarter": Charts are turned by multiples of 90° from how they were flattened, none set upright by itself. "none": Charts stay as they were flattened, at whatever angle that is."""
     quality: Literal["fast", "normal", "high"]
-    """How long a dense placement of the charts is searched for. "fast": A fraction of a second for up to some hundred charts. "normal": Up to twice as long; charts turned by any angle are tried at more angles. "high": Ten to twenty times as long, on finer grids."""
+    """How long a dense placement of the charts is searched for. "fast": A fraction of a second for up to some hundred charts. "normal": Two to four times as long; more angles and arrangements are tried. "high": Ten to twenty times as long, with many more arrangements tried."""
 
 @type_check_only
 class _DensityGroup(TypedDict, total=False):

@@ -323,9 +323,7 @@ mod tests {
         // A seam of 24 is longer by 4: an arm of the corner is cut off across.
         let around: f64 = parts.iter().map(|c| c.patch.mesh.boundary_length()).sum();
         assert!((around - (64.0 + 2.0 * 24.0 + 2.0 * 4.0)).abs() < 1e-9, "{around}");
-        for part in &parts {
-            assert!(part.l2 < 1.0 + 1e-9 && stretch::boundary_is_simple(&part.patch.mesh, &part.uv));
-        }
+        assert!(parts.iter().all(|part| stretch::boundary_is_simple(&part.patch.mesh, &part.uv)));
         let count = |surface: &_, by, settings: &Settings| folded(surface, &alone, &growing(by), settings).len();
         assert_eq!(count(&surface, 0.05, &settings), 2, "too little to tell");
         let price = |cover_price: f64| Settings { cover_price, ..Settings::default() };
