@@ -342,13 +342,13 @@ def test_a_road_is_straight(name, number, kind):
         assert_rectangle(layout, chart)
 
 
-@cases("belt", short={"its thin edges stay rings, which leave the texture empty": ["*"]})
+@cases("belt", short={"its thin edges hang on its faces, and end where these do not": ["*"]})
 def test_a_belt_is_straight_strips(name, number, kind):
     layout, _ = unwrapped(name, number, kind)
     assert layout.rectangles() > 0.99
 
 
-@cases("belt", short={"its two faces are cut across into pieces of unequal length": ["1*", "2*"]})
+@cases("belt")
 def test_a_belt_is_in_few_pieces(name, number, kind):
     _, report = unwrapped(name, number, kind)
     assert report["charts"] <= 6
@@ -447,7 +447,7 @@ def test_parts_that_are_alike_have_congruent_maps(name, number, kind):
     "leaves",
     kinds=(0,),
     short={
-        "one of three posts lies across the others": ["fence 1"],
+        "one of the posts lies across the others": ["fence 1", "fence 2", "fence 3"],
         "legs lie at four different angles": ["table *"],
         "some bricks lie across the others": ["bricks *"],
         "some leaves lie across the others": ["leaves 2", "leaves 3"],
@@ -535,7 +535,7 @@ def test_no_quad_is_bent(name, number):
         "a cap hangs on, or it is apart": ["barrel 1*"],
         "in one piece or in two": ["bracket 3*"],
         "flattened by planes, or rims and panels together": ["crate 3*"],
-        "strips are cut across at other places": ["cable 3*", "belt 1*"],
+        "strips are cut across at other places": ["cable 3*", "belt 1*", "belt 2*", "belt 3*"],
         "cut along other lines": ["torus 1*", "ball 1*", "rock 3*"],
     },
 )

@@ -21,8 +21,8 @@ use super::super::state::{ChartId, Cutting};
 use super::super::trial::{Verdict, trial};
 use super::{Proposal, Start};
 
-/// The cut runs in so much of the length around the middle.
-const MIDDLE: [f64; 2] = [0.4, 0.6];
+/// The cut runs in so much of the length around the middle, or where no polygon ends there, beside it.
+const PLACES: [[f64; 2]; 5] = [[0.4, 0.6], [0.3, 0.5], [0.5, 0.7], [0.2, 0.4], [0.6, 0.8]];
 /// A cut is no longer than so many times the mean width of the chart, its area over its length: a straight one across a strip is
 /// as long as that, and one along the sides of a triangulation up to about 1.4 times. What is longer runs along the chart, as
 /// the diagonals of triangles do that are as long as the chart itself.
@@ -55,12 +55,15 @@ pub(crate) fn cut_across(
         let is_open = |chart: &&Chart| cuts < MOST_CUTS && cost::fill_asks_for_another_cut(most_filled(chart));
         let Some(chart) = cutting.chart(id).filter(is_open) else { continue };
         let before = hold(&chart.uv, texture);
-        let Some(proposal) = proposal(&cutting, chart, settings, run)? else { continue };
-        if let Verdict::Charts(parts) = trial(&cutting, &proposal, settings, rungs, run)?
-            && cost::fills_better(before, parts.iter().map(|part| hold(&part.uv, texture)))
-        {
-            rungs.take(Rung::Split);
-            open.extend(cutting.replace(&[id], parts).into_iter().map(|part| (part, cuts + 1)));
+        for place in PLACES {
+            let Some(chart) = cutting.chart(id) else { break };
+            let Some(proposal) = proposal(&cutting, chart, place, settings, run)? else { continue };
+            if let Verdict::Charts(parts) = trial(&cutting, &proposal, settings, rungs, run)?
+                && cost::fills_better(before, parts.iter().map(|part| hold(&part.uv, texture)))
+            {
+                rungs.take(Rung::Split);
+                open.extend(cutting.replace(&[id], parts).into_iter().map(|part| (part, cuts + 1)));
+            }
         }
     }
     Ok(cutting.into_charts())
@@ -114,17 +117,18 @@ fn range(uv: &[Point2<f64>], along: Vector2<f64>) -> (f64, f64) {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)))
 }
 
-/// A cut across a chart near the middle of its length; `None` where there is none, or where it would be longer than the chart is
-/// wide, as it is where no polygon ends near the middle.
+/// A cut across a chart at some place of its length; `None` where there is none, or where it would be longer than the chart is
+/// wide, as it is where no polygon ends there.
 fn proposal(
     cutting: &Cutting<'_>,
     chart: &Chart,
+    place: [f64; 2],
     settings: &Settings,
     run: &Run<'_>,
 ) -> Result<Option<Proposal>, Cancelled> {
     let (patch, uv) = (&chart.patch, &chart.uv);
     let along = axis(uv);
-    let ends = ends(patch, uv, along);
+    let ends = ends(patch, uv, along, place);
     let crease_weight = settings.segmentation.crease_weight;
     let parts = segmentation::between(&patch.mesh, &patch.polygon, [&ends[0], &ends[1]], crease_weight, run.progress)?;
     let Some(parts) = parts else { return Ok(None) };
@@ -137,9 +141,9 @@ fn proposal(
     Ok(Some(Proposal { edit: Edit::new(cutting.mesh(), &[], &open), start: Start::Lying }))
 }
 
-/// The faces at either end of a chart, between which it may be cut: those of polygons that lie beyond the middle, or reach into it from
-/// there. Polygons that reach over the whole middle are at neither end.
-fn ends(patch: &Patch, uv: &[Point2<f64>], along: Vector2<f64>) -> [Vec<FaceId>; 2] {
+/// The faces at either end of a chart, between which it may be cut: those of polygons that lie beyond a place of its length, or reach into it from
+/// there. Polygons that reach over the whole place are at neither end.
+fn ends(patch: &Patch, uv: &[Point2<f64>], along: Vector2<f64>, [begin, end]: [f64; 2]) -> [Vec<FaceId>; 2] {
     let (low, high) = range(uv, along);
     let mut names = patch.polygon.clone();
     names.sort_unstable();
@@ -153,7 +157,6 @@ fn ends(patch: &Patch, uv: &[Point2<f64>], along: Vector2<f64>) -> [Vec<FaceId>;
             (*first, *last) = (first.min(at), last.max(at));
         }
     }
-    let [begin, end] = MIDDLE;
     let faces_of =
         |is_wanted: &dyn Fn([f64; 2]) -> bool| patch.mesh.faces().filter(|&f| is_wanted(span[place(f)])).collect();
     [faces_of(&|[first, last]| first < begin && last <= end), faces_of(&|[first, last]| first >= begin && last > end)]
@@ -283,6 +286,15 @@ mod tests {
                 assert!((around - straight).abs() < 1e-9, "{along} by {across} cells: every cut is straight, {around}");
             }
         }
+    }
+
+    #[test]
+    fn where_no_polygon_ends_in_the_middle_the_cut_is_beside_it() {
+        // Cells as long as a third of the strip.
+        let parts = cut_up(vec![strip([3, 2], [30.0, 2.0])]);
+        assert_eq!(parts.len(), 3);
+        let around: f64 = parts.iter().flat_map(|c| boundary_lengths(&c.patch.mesh)).sum();
+        assert!((around - 72.0).abs() < 1e-9, "both cuts are straight: {around}");
     }
 
     #[test]
