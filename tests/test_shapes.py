@@ -333,9 +333,7 @@ def test_a_cable_is_cut_along_one_line_into_rectangles(name, number, kind):
         assert_rectangle(layout, chart)
 
 
-@cases(
-    "road", short={"a flat strip keeps its bends, though straight it would be stretched by 2 % at most": ["2*"]}
-)
+@cases("road", short={"a flat strip keeps its bends, though straight it would be stretched by 2 % at most": ["2*"]})
 def test_a_road_is_straight(name, number, kind):
     layout, report = unwrapped(name, number, kind)
     for chart in range(report["charts"]):
@@ -535,7 +533,7 @@ def test_no_quad_is_bent(name, number):
         "a cap hangs on, or it is apart": ["barrel 1*"],
         "in one piece or in two": ["bracket 3*"],
         "flattened by planes, or rims and panels together": ["crate 3*"],
-        "strips are cut across at other places": ["cable 3*", "belt 1*", "belt 2*", "belt 3*"],
+        "strips are cut across at other places": ["cable 3*", "belt 2*", "belt 3*"],
         "cut along other lines": ["torus 1*", "ball 1*", "rock 3*"],
     },
 )

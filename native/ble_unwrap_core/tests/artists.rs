@@ -95,14 +95,14 @@ fn left_and_right_parts_are_mirror_images() {
 }
 
 #[test]
-fn a_ring_is_a_strip_cut_where_it_is_hidden() {
+fn a_ring_is_two_straight_strips_cut_where_it_is_hidden() {
     let mesh = torus(0.35, 48, 24);
     let atlas = unwrapped(&mesh, &Settings::default());
-    assert_eq!(atlas.report.charts, 1);
+    assert_eq!(atlas.report.charts, 2);
     let away = |v: u32| mesh.positions[v as usize][0].hypot(mesh.positions[v as usize][1]);
     let seams = seams(&mesh, &atlas);
     let inner = seams.iter().filter(|[a, b]| away(*a) < 0.66 && away(*b) < 0.66).count();
-    assert!(inner >= 48 && seams.len() <= 48 + 24, "{inner} of {} edges on the inner equator", seams.len());
+    assert!(inner >= 48 && seams.len() <= 48 + 2 * 24, "{inner} of {} edges on the inner equator", seams.len());
 }
 
 #[test]

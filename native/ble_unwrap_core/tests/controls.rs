@@ -82,7 +82,8 @@ fn a_limit_over_the_atlas_is_spent_on_fewer_charts_and_kept() {
         [(blob(), 1.005), (blob(), 1.008), (blob(), 1.015), (blob(), 1.03), (many_components(4), 1.02)]
     {
         let flat = mesh.flat();
-        let charts = Settings { stretch_limit, ..Settings::default() };
+        // What is cut for the sake of the texture is no matter of the limit.
+        let charts = Settings { stretch_limit, cover_price: 0.0, ..Settings::default() };
         let all = Settings { limit_over: LimitOver::Atlas, ..charts.clone() };
         let run = |settings, threads| {
             let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
@@ -103,6 +104,32 @@ fn a_limit_over_the_atlas_is_spent_on_fewer_charts_and_kept() {
     // Where charts are mirrored, halves that only the plane keeps apart are joined under either limit, so there is little left to save.
     assert!(after < before, "{before} charts became {after}");
     assert!(single > 0, "no chart has more than the limit: the room was not used");
+}
+
+#[test]
+fn a_texture_is_filled_for_some_seam_and_for_none_where_that_has_no_price() {
+    let (mut better, mut longer) = (0.0, 0.0);
+    let meshes: Vec<PolyMesh> =
+        catalogue().map(|case| (case.build)()).filter(|mesh| mesh.faces.len() < 20_000).collect();
+    for mesh in &meshes {
+        let flat = mesh.flat();
+        let unwrapped = |cover_price: f64| {
+            let settings = Settings { cover_price, ..Settings::default() };
+            unwrap(&input(mesh, &flat), &settings, &Progress::new()).map(|atlas| atlas.report)
+        };
+        let (Ok(whole), Ok(cut)) = (unwrapped(0.0), unwrapped(2.5)) else { continue };
+        let folds = cut.rungs.iter().find(|rung| rung.0 == "fold").map_or(0, |rung| rung.1);
+        assert!(!whole.rungs.iter().any(|rung| rung.0 == "fold"));
+        if folds == 0 {
+            assert_eq!((cut.charts, cut.seam_length), (whole.charts, whole.seam_length));
+            continue;
+        }
+        // Each of up to three cuts may make them a fifth longer.
+        assert!(cut.charts > whole.charts && cut.seam_length <= 1.75 * whole.seam_length, "{cut:?}");
+        better += (cut.packing_efficiency / whole.packing_efficiency).ln();
+        longer += (cut.seam_length / whole.seam_length).ln();
+    }
+    assert!(better > 0.2 && better > longer, "{better} {longer}");
 }
 
 /// Its rims are strips or rings, by `straighten`.

@@ -35,7 +35,7 @@ const EFFICIENCY: f64 = 0.04;
 
 static ROWS: [Row; 17] = [
     row("flat grid", [1, 1], 1.0, 0.0, 0.996),
-    row("bumpy grid", [1, 1], 1.0112, 0.0, 0.841),
+    row("bumpy grid", [1, 1], 1.0238, 0.0, 0.902),
     row("disc", [1, 1], 1.0, 0.0, 0.783),
     row("L shape", [1, 1], 1.0, 0.0, 0.747),
     row("annulus", [1, 1], 1.0, 0.0, 0.658),
@@ -45,12 +45,12 @@ static ROWS: [Row; 17] = [
     row("open cylinder", [1, 1], 1.0, 0.691, 0.476),
     row("capped cylinder", [3, 3], 1.0, 3.355, 0.475),
     row("cone", [1, 1], 1.0, 0.85, 0.54),
-    row("torus", [1, 1], 1.0297, 1.692, 0.289),
+    row("torus", [2, 2], 1.0385, 2.284, 0.781),
     row("plate with five holes", [6, 6], 1.0, 6.083, 0.672),
     row("Moebius strip", [2, 2], 1.0, 0.617, 0.548),
     row("Klein bottle", [1, 1], 1.0251, 2.011, 0.571),
     row("face", [1, 1], 1.0063, 0.777, 0.570),
-    row("small sculpt", [2, 2], 1.0211, 4.389, 0.491),
+    row("small sculpt", [3, 3], 1.0281, 4.772, 0.624),
 ];
 
 #[test]

@@ -6,7 +6,6 @@ use nalgebra::Point3;
 
 use crate::atlas::Atlas;
 use crate::cache::{Fingerprint, Kind, Run};
-use crate::charts::Chart;
 use crate::clock::Clock;
 use crate::error::UnwrapError;
 use crate::mesh::{self, ConditionOptions, FaceId, Groups, MeshInput, Surface};
@@ -51,9 +50,15 @@ impl Prepared {
             vertex.iter().map(|&v| input.positions[v as usize].map(|x| x / scale).into()).collect();
         let visibility = self.visibility(&positions, settings, run)?;
         let visibility = visibility.as_deref().map(Vec::as_slice);
-        let cover = |charts: &[&Chart]| layout::cover(charts, settings, run.progress);
-        let (charts, rungs, originals) =
-            cutting::cut(&self.surface, &self.components, &positions, visibility, &cover, settings, run)?;
+        let (charts, rungs, originals) = cutting::cut(
+            &self.surface,
+            &self.components,
+            &positions,
+            visibility,
+            &|charts| layout::cover(charts, settings, run.progress),
+            settings,
+            run,
+        )?;
         clock.lap("charts");
         layout::lay_out(input, &self.surface, charts, &originals, rungs, settings, clock, run)
     }

@@ -336,7 +336,7 @@ mod tests {
     #[test]
     fn what_is_mirrored_stays_so() {
         // Three sides of a square.
-        let surface = two(|x, y| !(4..12).contains(&x) || y < 4, 1.01);
+        let surface = two(|x, y| !(2..14).contains(&x) || y < 2, 1.01);
         let mesh = &surface.0;
         let place = |v| {
             let p: nalgebra::Point3<f64> = mesh.position(v);
