@@ -19,7 +19,7 @@ const MARGIN: f64 = 1.0;
 /// # Errors
 /// [`Cancelled`].
 pub(crate) fn cover(charts: &[&Chart], settings: &Settings, progress: &Progress) -> Result<Option<f64>, Cancelled> {
-    let mut scaled: Vec<Chart> = charts.iter().map(|chart| Chart::clone(chart)).collect();
+    let mut scaled: Vec<Chart> = charts.iter().copied().cloned().collect();
     scale::scale(&mut scaled, settings);
     let PackSettings { width, height, rotation, .. } = settings.packing;
     let longer = u64::from(width.max(height));

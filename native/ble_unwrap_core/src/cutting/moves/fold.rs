@@ -41,13 +41,15 @@ const LEAST_COUNTED: f64 = 0.005;
 /// The share of a texture that charts cover; `None` where they cannot be packed.
 pub(crate) type Cover<'a> = dyn Fn(&[&Chart]) -> Result<Option<f64>, Cancelled> + Sync + 'a;
 
+/// For each side of a mesh, and charts that are to be cut, the side that is cut, too: its mirror image, or itself where nothing is mirrored. None where nothing
+/// may be cut.
+pub(crate) type Images<'a> = dyn Fn(&[&Chart]) -> Result<Vec<HalfedgeId>, Cancelled> + 'a;
+
 /// What has to be known of a surface beyond its mesh, where its charts are folded.
 pub(crate) struct Folds<'a> {
     /// Whether a chart may be cut: not one that copies are made of, nor a copy.
     pub(crate) may_be_cut: &'a dyn Fn(&Chart) -> bool,
-    /// For each side of the mesh, and charts that are to be cut, the side that is cut, too: its mirror image, or itself where nothing is mirrored. None
-    /// where nothing may be cut.
-    pub(crate) images: &'a dyn Fn(&[&Chart]) -> Result<Vec<HalfedgeId>, Cancelled>,
+    pub(crate) images: &'a Images<'a>,
     pub(crate) cover: &'a Cover<'a>,
 }
 
@@ -297,7 +299,7 @@ mod tests {
 
     fn folded(
         (mesh, polygon, charts): &(TriMesh, Vec<u32>, Vec<Chart>),
-        images: &dyn Fn(&[&Chart]) -> Result<Vec<HalfedgeId>, Cancelled>,
+        images: &Images<'_>,
         cover: &Cover<'_>,
         settings: &Settings,
     ) -> Vec<Chart> {
