@@ -66,7 +66,8 @@ const LEAST_GAIN: f64 = 0.9;
 const WELL_COVERED: f64 = 0.7;
 /// A chart that fills this share of the smallest box around it lies well beside others.
 const FILLS_ITS_BOX: f64 = 0.8;
-/// A cut that lets charts be folded adds no more than this share of all seam, whatever it brings: a rock in three pieces is worse than a texture that it half fills.
+/// Cuts that let charts be folded add no more than this share of the length of all seams, whatever they bring: a rock in three pieces is worse than a texture
+/// that it half fills.
 const MOST_SEAM_ADDED: f64 = 0.2;
 /// A cut that lets charts be folded covers at least so much more of the texture: less is lost or won by chance when charts are packed.
 const LEAST_COVER_GAINED: f64 = 0.06;
@@ -313,6 +314,11 @@ pub(super) fn is_ill_covered(covered: f64) -> bool {
     covered < WELL_COVERED
 }
 
+/// How long cuts that let charts be folded may be, all together, beside seams of some length.
+pub(super) fn affordable_seam(length: f64) -> f64 {
+    MOST_SEAM_ADDED * length
+}
+
 /// Whether a chart that fills some share of the smallest box around it may be cut to be folded: what unrolls keeps its shape, and a rectangle is to stay one.
 pub(super) fn may_be_folded(chart: &Chart, box_filled: f64) -> bool {
     !unrolls(chart) && box_filled < FILLS_ITS_BOX
@@ -322,7 +328,7 @@ pub(super) fn may_be_folded(chart: &Chart, box_filled: f64) -> bool {
 /// it is worth nothing, or too little to tell.
 pub(super) fn value_of_cover(added_share: f64, gained: f64, settings: &Settings) -> Option<f64> {
     let value = settings.cover_price * gained - added_share;
-    (gained >= LEAST_COVER_GAINED && added_share <= MOST_SEAM_ADDED && value > 0.0).then_some(value)
+    (gained >= LEAST_COVER_GAINED && value > 0.0).then_some(value)
 }
 
 #[cfg(test)]
@@ -575,6 +581,7 @@ mod tests {
         let bent = Chart { l2: 1.02, ..flat.clone() };
         assert!(may_be_folded(&bent, 0.5) && !may_be_folded(&bent, 0.9) && !may_be_folded(&flat, 0.5));
         assert!(is_ill_covered(0.5) && !is_ill_covered(0.8));
+        assert!((affordable_seam(10.0) - 2.0).abs() < 1e-12);
     }
 
     #[test]

@@ -43,6 +43,11 @@ impl Edit {
         0.5 * self.glue.iter().map(|&h| cutting.seam_length(h)).sum::<f64>()
     }
 
+    /// How long the edges are that it opens, however much a seam there counts for.
+    pub(super) fn opened_length(&self, cutting: &Cutting<'_>) -> f64 {
+        0.5 * self.open.iter().map(|&h| cutting.mesh().edge_length(h)).sum::<f64>()
+    }
+
     /// The charts that it changes, ascending.
     pub(super) fn charts(&self, cutting: &Cutting<'_>) -> Vec<ChartId> {
         let mut found: Vec<ChartId> =

@@ -84,17 +84,33 @@ pub(crate) fn fold(
     let images = (folds.images)(&large)?;
     let mut cutting = Cutting::new(mesh, polygon, charts);
     let seams = mesh.edges().filter(|&h| !mesh.is_boundary(h) && cutting.is_seam(h));
-    let seam: f64 = seams.map(|h| cutting.seam_length(h)).sum();
+    let (mut seam, mut length) = (0.0, 0.0);
+    for h in seams {
+        seam += cutting.seam_length(h);
+        length += mesh.edge_length(h);
+    }
+    let mut added = 0.0;
     for _ in 0..MOST_CUTS {
         run.progress.check()?;
         if !cost::is_ill_covered(covered) {
             break;
         }
         let large = cutting.ids().filter(|id| cutting.chart(*id).is_some_and(is_large)).collect();
-        let search =
-            Search { cutting: &cutting, large, images: &images, area, seam, covered, cover: folds.cover, settings };
+        let affordable = cost::affordable_seam(length) - added;
+        let search = Search {
+            cutting: &cutting,
+            large,
+            images: &images,
+            area,
+            seam,
+            affordable,
+            covered,
+            cover: folds.cover,
+            settings,
+        };
         let Some((edit, parts, after)) = search.best_cut(rungs, run)? else { break };
         rungs.take(Rung::Fold);
+        added += edit.opened_length(&cutting);
         cutting.replace(&edit.charts(&cutting), parts);
         covered = after;
     }
@@ -132,6 +148,8 @@ struct Search<'a> {
     area: f64,
     /// That of all charts before any was cut.
     seam: f64,
+    /// The length that a cut may add, whatever it brings and however little of it can be seen.
+    affordable: f64,
     /// What is covered now.
     covered: f64,
     cover: &'a Cover<'a>,
@@ -163,7 +181,7 @@ impl Search<'_> {
             }
         }
         // What would not be worth it even if nothing were left empty is not packed.
-        candidates.retain(|candidate| value(candidate.cut.cost, 1.0).is_some());
+        candidates.retain(|candidate| self.is_affordable(&candidate.cut) && value(candidate.cut.cost, 1.0).is_some());
         candidates.sort_by(|a, b| a.cut.cost.total_cmp(&b.cut.cost));
         candidates.truncate(MOST_PACKED);
         let cuts: Vec<&Cut> = candidates.iter().map(|candidate| &candidate.cut).collect();
@@ -182,13 +200,17 @@ impl Search<'_> {
         let Some((_, best)) = best else { return Ok(None) };
         let lobe = best.pieces.smoothed(&best.lobe, self.settings.segmentation.crease_weight, run.progress)?;
         let cut = self.cut(best.chart, &lobe);
-        if self.parts(&cut).is_none() {
+        if !self.is_affordable(&cut) || self.parts(&cut).is_none() {
             return Ok(None);
         }
         let proposal = Proposal { edit: cut.edit, start: Start::Lying };
         let Verdict::Charts(parts) = trial(cutting, &proposal, self.settings, rungs, run)? else { return Ok(None) };
         let after = self.cover_with(&proposal.edit, &parts)?.filter(|after| value(cut.cost, *after).is_some());
         Ok(after.map(|after| (proposal.edit, parts, after)))
+    }
+
+    fn is_affordable(&self, cut: &Cut) -> bool {
+        cut.edit.opened_length(self.cutting) <= self.affordable
     }
 
     /// Whether an edge lies in the plane that mirrors the surface.
