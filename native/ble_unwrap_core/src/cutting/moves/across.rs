@@ -55,7 +55,9 @@ pub(crate) fn cut_across(
         let is_open = |chart: &&Chart| cuts < MOST_CUTS && cost::fill_asks_for_another_cut(most_filled(chart));
         let Some(chart) = cutting.chart(id).filter(is_open) else { continue };
         let before = hold(&chart.uv, texture);
-        for place in PLACES {
+        // A body that fills a texture fairly is not worth a cut that leaves its parts unequal.
+        let is_empty = cost::fill_asks_for_a_cut(most_filled(chart), 0.0);
+        for place in PLACES.into_iter().take(if is_empty { PLACES.len() } else { 1 }) {
             let Some(chart) = cutting.chart(id) else { break };
             let Some(proposal) = proposal(&cutting, chart, place, settings, run)? else { continue };
             if let Verdict::Charts(parts) = trial(&cutting, &proposal, settings, rungs, run)?
