@@ -54,8 +54,8 @@ pub(crate) struct Folds<'a> {
 }
 
 /// The charts of a surface, large ones cut where that covers so much more of the texture that it is worth the seam
-/// ([`cost::value_of_cover`]). Sorted by lowest face. Packs some dozens of times, and never where many charts share the texture; at most once where it is
-/// well covered.
+/// ([`cost::value_of_cover`]). Sorted by lowest face. Packs up to 16 times, roughly; once where the texture is well covered, and never
+/// where no chart is [large](LARGE).
 ///
 /// # Errors
 /// [`Cancelled`].
