@@ -43,7 +43,7 @@ def mark_chart_borders(mesh, uv, source_faces, chart=None):
     """
     seams, ours = read_array(mesh.edges, "use_seam", bool), remembered(mesh)
     looked_at = _edges_of(mesh, source_faces)
-    border = _chart_borders(mesh, uv, chart) & looked_at
+    border = chart_borders(mesh, uv, chart) & looked_at
     own_left = ours & seams
     cleared = ours & ~seams & (border | ~looked_at) if own_left.any() else np.zeros_like(ours)
     wished = seams & ~ours
@@ -75,7 +75,7 @@ def _edges_of(mesh, faces):
     return result
 
 
-def _chart_borders(mesh, uv, chart):
+def chart_borders(mesh, uv, chart=None):
     """Edges where the UVs, or the charts, of two neighbouring faces differ, (e,) bool."""
     corner_vertices = read_corner_vertices(mesh)
     offsets = read_face_offsets(mesh)
