@@ -4,7 +4,7 @@ import json
 
 import bpy
 
-from . import last_check, last_result, overlay, overlay_colours, overlay_legend, properties, targets
+from . import last_check, last_comparison, last_result, overlay, overlay_colours, overlay_legend, properties, targets
 
 CATEGORY = "BLE Unwrap"
 STATUS_ICONS = {"HEAD": "DOT", "OK": "CHECKMARK", "BAD": "ERROR", "WARN": "INFO", "INFO": "BLANK1"}
@@ -137,6 +137,32 @@ class _Show:
             column.label(text=f"Worst here: {overlay_colours.range_text(*factors)}")
 
 
+class _Compare:
+    bl_label = "Compare"
+    bl_category = CATEGORY
+    bl_region_type = "UI"
+
+    def draw(self, _context):
+        layout = self.layout
+        if not last_comparison.is_there():
+            layout.operator_context = "INVOKE_DEFAULT"
+            layout.operator("uv.ble_unwrap_compare", icon="MOD_UVPROJECT")
+            return
+        layout.label(text=last_comparison.title(), icon="UV")
+        table = layout.grid_flow(row_major=True, columns=3, align=True)
+        for cells in (("", "BLE Unwrap", "Smart UV"), *last_comparison.rows()):
+            for text in cells:
+                table.label(text=text)
+        for text, operator, icon in (
+            ("Look", "uv.ble_unwrap_look", "HIDE_OFF"),
+            ("Keep This One", "uv.ble_unwrap_keep", "CHECKMARK"),
+        ):
+            row = layout.row(align=True)
+            for side, name in (("BLE", "BLE"), ("SMART", "Smart UV")):
+                row.operator(operator, text=f"{text}: {name}", icon=icon).side = side
+        layout.operator("uv.ble_unwrap_discard", icon="X")
+
+
 class _Advanced:
     bl_label = "Advanced"
     bl_category = CATEGORY
@@ -188,6 +214,11 @@ class IMAGE_PT_ble_unwrap_show(_Show, bpy.types.Panel):
     bl_parent_id = "IMAGE_PT_ble_unwrap"
 
 
+class IMAGE_PT_ble_unwrap_compare(_Compare, bpy.types.Panel):
+    bl_space_type = "IMAGE_EDITOR"
+    bl_parent_id = "IMAGE_PT_ble_unwrap"
+
+
 class IMAGE_PT_ble_unwrap_advanced(_Advanced, bpy.types.Panel):
     bl_space_type = "IMAGE_EDITOR"
     bl_parent_id = "IMAGE_PT_ble_unwrap"
@@ -212,6 +243,11 @@ class VIEW3D_PT_ble_unwrap_show(_Show, bpy.types.Panel):
     bl_parent_id = "VIEW3D_PT_ble_unwrap"
 
 
+class VIEW3D_PT_ble_unwrap_compare(_Compare, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "VIEW3D_PT_ble_unwrap"
+
+
 class VIEW3D_PT_ble_unwrap_advanced(_Advanced, bpy.types.Panel):
     bl_space_type = "VIEW_3D"
     bl_parent_id = "VIEW3D_PT_ble_unwrap"
@@ -222,11 +258,13 @@ CLASSES = (
     IMAGE_PT_ble_unwrap_certificate,
     IMAGE_PT_ble_unwrap_check,
     IMAGE_PT_ble_unwrap_show,
+    IMAGE_PT_ble_unwrap_compare,
     IMAGE_PT_ble_unwrap_advanced,
     VIEW3D_PT_ble_unwrap,
     VIEW3D_PT_ble_unwrap_certificate,
     VIEW3D_PT_ble_unwrap_check,
     VIEW3D_PT_ble_unwrap_show,
+    VIEW3D_PT_ble_unwrap_compare,
     VIEW3D_PT_ble_unwrap_advanced,
 )
 
