@@ -7,8 +7,8 @@ NAME = "BLE Unwrap | Smart UV Project"  # what is left and what is right in it
 
 
 class _Shown:
-    picture = None  # (h, w, 3), the lowest row first
-    name = ""  # that Blender gave to the image
+    picture = None  # (h, w, 3), the lowest row first; kept when the image is gone, since undo may bring that back
+    name, uid = "", 0  # of the image
     editors = []  # (area, name of the image that it showed before)
 
 
@@ -17,38 +17,36 @@ def put_up(context, picture):
     take_away(context)
     height, width = picture.shape[:2]
     image = bpy.data.images.new(NAME, width, height, alpha=False)
-    _Shown.picture, _Shown.name = picture, image.name
+    _Shown.picture, _Shown.name, _Shown.uid = picture, image.name, image.session_uid
     _fill(image)
-    if area := _editor(context):
-        before = area.spaces.active.image
-        _Shown.editors = [(area, before.name if before else "")]
-        area.spaces.active.image = image
+    _show_in_editor(context, image)
 
 
 def take_away(context):
     """Removes the image; editors that show it show again what they did before."""
-    image = bpy.data.images.get(_Shown.name) if _Shown.name else None
     restore_editors(context)
-    if image is not None:
+    if (image := _image()) is not None:
         bpy.data.images.remove(image)
-    _Shown.picture, _Shown.name = None, ""
 
 
 def forget():
     """Another file is loaded: there is nothing of it in that."""
-    _Shown.picture, _Shown.name, _Shown.editors = None, "", []
+    _Shown.picture, _Shown.name, _Shown.uid, _Shown.editors = None, "", 0, []
 
 
-def is_there():
-    """Whether the image is in Blender."""
-    return bool(_Shown.name) and _Shown.name in bpy.data.images
-
-
-def draw_again():
-    """After undo: Blender brings the image back, but without its pixels."""
+def _image():
+    """The image, or None where it is gone; another one may have its name by now."""
     image = bpy.data.images.get(_Shown.name) if _Shown.name else None
-    if image is not None and _Shown.picture is not None and tuple(image.size) == _Shown.picture.shape[1::-1]:
+    return image if image is not None and image.session_uid == _Shown.uid else None
+
+
+def draw_again(context):
+    """After undo or redo: Blender may have brought the image back, but without its pixels, and shows it nowhere."""
+    image = _image()
+    if image is not None and tuple(image.size) == _Shown.picture.shape[1::-1]:
         _fill(image)
+        if not _Shown.editors:
+            _show_in_editor(context, image)
 
 
 def restore_editors(context):
@@ -58,7 +56,7 @@ def restore_editors(context):
         if area not in areas or area.type != "IMAGE_EDITOR":
             continue  # it was closed or is something else by now
         shown = area.spaces.active.image
-        if shown is None or shown.name == _Shown.name:
+        if shown is None or shown.session_uid == _Shown.uid:
             area.spaces.active.image = bpy.data.images.get(before) if before else None
     _Shown.editors = []
 
@@ -69,6 +67,14 @@ def _fill(image):
     pixels[..., :3] = picture
     image.pixels.foreach_set(pixels.reshape(-1))
     image.update()
+
+
+def _show_in_editor(context, image):
+    _Shown.editors = []
+    if area := _editor(context):
+        before = area.spaces.active.image
+        _Shown.editors = [(area, before.name if before else "")]
+        area.spaces.active.image = image
 
 
 def _editor(context):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from .check_report import percent
+from .wording import counted
 
 
 def rows(measured, seconds, *, length_text):
@@ -16,8 +17,8 @@ def rows(measured, seconds, *, length_text):
         ("Stretch", *(percent(one["l2_chart_scale"]) for one in measured)),
         ("Worst island", *(percent(one["l2_worst_chart"]) for one in measured)),
         ("Texture used", *(_used(one) for one in measured)),
-        ("Overlapping faces", *(_overlaps(one) for one in measured)),
-        ("Flipped faces", *(f"{len(one['flipped_faces']):,}" for one in measured)),
+        ("Overlapping", *(_overlaps(one) for one in measured)),
+        ("Flipped", *(counted(len(one["flipped_faces"]), "face") for one in measured)),
         ("Seconds", *(f"{taken:.2f}" if taken < 10 else f"{taken:,.0f}" for taken in seconds)),
     ]
 
@@ -34,4 +35,4 @@ def _used(measured):
 
 def _overlaps(measured):
     least = "" if measured["overlaps_complete"] else "≥ "
-    return f"{least}{len(measured['overlapping_faces']):,}"
+    return f"{least}{counted(len(measured['overlapping_faces']), 'face')}"

@@ -69,8 +69,8 @@ def undone(*_):
     if not _Shown.entries:
         return
     if is_there():
-        comparison_image.draw_again()
-    elif not comparison_image.is_there():
+        comparison_image.draw_again(bpy.context)
+    else:
         comparison_image.restore_editors(bpy.context)
 
 

@@ -211,7 +211,7 @@ def _draw():
         if not _is_drawn(kept, obj, settings):
             if not kept.changed:
                 _later(SOON_SECONDS)
-        elif kept.picture is not None and obj.visible_in_viewport_get(view) and view.overlay.show_overlays:
+        elif kept.picture is not None and obj.visible_get(viewport=view) and view.overlay.show_overlays:
             shown.append((kept, obj.matrix_world.copy(), obj.mode == "EDIT"))
     try:
         overlay_drawing.draw(context, shown, _Shown.fill, _Shown.seams, settings[1])

@@ -28,7 +28,7 @@ void main()
 # A face that is seen at an angle is darker, so that the shape is seen. Its normal comes from neighbouring pixels.
 # Colours are those of the screen, as in the legend, but what 3D views are drawn into takes linear ones.
 LIGHT = """
-vec4 linear(vec3 colour)
+vec4 in_linear_light(vec3 colour)
 {
   vec3 high = pow((colour + 0.055) / 1.055, vec3(2.4));
   return vec4(mix(colour / 12.92, high, step(vec3(0.04045), colour)), alpha);
@@ -47,7 +47,7 @@ COLOURED = (
     + """
 void main()
 {
-  fragColor = linear(shade.rgb * light());
+  fragColor = in_linear_light(shade.rgb * light());
 }
 """
 )
@@ -70,7 +70,7 @@ void main()
   vec2 cell = shade * cells;
   vec2 width = max(fwidth(cell), vec2(1e-5));
   vec3 tint = mix(vec3(0.62, 0.80, 1.0), vec3(1.0, 0.82, 0.55), checker(cell / 8.0, width / 8.0));
-  fragColor = linear(tint * mix(0.45, 0.95, checker(cell, width)) * light());
+  fragColor = in_linear_light(tint * mix(0.45, 0.95, checker(cell, width)) * light());
 }
 """
 )

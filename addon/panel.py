@@ -149,17 +149,19 @@ class _Compare:
             layout.operator("uv.ble_unwrap_compare", icon="MOD_UVPROJECT")
             return
         layout.label(text=last_comparison.title(), icon="UV")
-        table = layout.grid_flow(row_major=True, columns=3, align=True)
-        for cells in (("", "BLE Unwrap", "Smart UV"), *last_comparison.rows()):
-            for text in cells:
-                table.label(text=text)
-        for text, operator, icon in (
-            ("Look", "uv.ble_unwrap_look", "HIDE_OFF"),
-            ("Keep This One", "uv.ble_unwrap_keep", "CHECKMARK"),
-        ):
-            row = layout.row(align=True)
-            for side, name in (("BLE", "BLE"), ("SMART", "Smart UV")):
-                row.operator(operator, text=f"{text}: {name}", icon=icon).side = side
+        table = layout.column(align=True)
+        for label, *texts in (("", "BLE Unwrap", "Smart UV"), *last_comparison.rows()):
+            row = table.split(factor=0.36)
+            row.label(text=label)
+            row = row.split(factor=0.5)
+            for text in texts:
+                row.label(text=text)
+        for side, name in (("BLE", "BLE Unwrap"), ("SMART", "Smart UV")):
+            row = layout.split(factor=0.36)
+            row.label(text=name)
+            row = row.row(align=True)
+            row.operator("uv.ble_unwrap_look", text="", icon="HIDE_OFF").side = side
+            row.operator("uv.ble_unwrap_keep", icon="CHECKMARK").side = side
         layout.operator("uv.ble_unwrap_discard", icon="X")
 
 

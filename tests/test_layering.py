@@ -349,6 +349,8 @@ PLAIN_MAY_IMPORT = {
     "uv_align.py": {"numpy", ".uv_islands"},
     "triangle_shapes.py": {"numpy"},
     "overlay_colours.py": {"numpy", ".triangle_shapes"},
+    "layout_picture.py": {"numpy"},
+    "comparison_table.py": {"numpy", ".check_report", ".wording"},
     "check_report.py": {"numpy", ".certificate", ".surface_report", ".wording"},
     "surface_report.py": {"numpy", ".certificate", ".wording"},
     "cloud_report.py": {".certificate", ".wording"},
@@ -365,6 +367,8 @@ NEVER = {
     "settings_table.py": NATIVE | BRIDGES | {"bpy", "bmesh", "numpy", ".properties"},
     "last_result.py": NATIVE | BRIDGES,
     "last_check.py": NATIVE | BRIDGES,
+    "last_comparison.py": NATIVE | BRIDGES,
+    "comparison_image.py": NATIVE | BRIDGES | {".properties"},
     # What is drawn over surfaces is read, never written; only what draws needs a window.
     "overlay_mesh.py": NATIVE | BRIDGES | {"bpy", "gpu", ".properties"},
     "overlay_drawing.py": NATIVE | BRIDGES | {"bpy", ".properties"},

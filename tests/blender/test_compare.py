@@ -113,11 +113,11 @@ def test_the_table_tells_what_was_measured(rows):
     compare()
     table = rows()
     assert list(table) == [
-        *("Islands", "Seams", "Stretch", "Worst island", "Texture used", "Overlapping faces", "Flipped faces"),
+        *("Islands", "Seams", "Stretch", "Worst island", "Texture used", "Overlapping", "Flipped"),
         *("Seconds", "Angle limit"),
     ]
-    assert table["Overlapping faces"] == ("0", "120"), "Smart UV Project lays two turns of a ramp on each other"
-    assert table["Flipped faces"][0] == "0"
+    assert table["Overlapping"] == ("0 faces", "120 faces"), "Smart UV Project lays two turns of a ramp on each other"
+    assert table["Flipped"][0] == "0 faces"
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
@@ -214,15 +214,33 @@ def test_undo_is_one_step(is_there, mode):
     assert list(bpy.data.objects.keys()) == list(bpy.data.meshes.keys()) == ["Sphere"]
     bpy.ops.ed.redo()
     assert is_there() and bpy.data.images.keys() == [IMAGE]
-    pixels = np.empty(np.prod(bpy.data.images[IMAGE].size) * 4, np.float32)
-    bpy.data.images[IMAGE].pixels.foreach_get(pixels)
-    assert len(np.unique(pixels)) > 10, "the picture is drawn again"
+    assert_drawn()
     keep(side="BLE")
     bpy.ops.ed.undo_push(message="keep")
     assert not is_there()
     bpy.ops.ed.undo()
     assert is_there(), "one may choose anew"
+    assert_drawn()
     assert discard() == {"FINISHED"} and map_names(bpy.data.objects["Sphere"]) == ["UVMap"]
+
+
+def assert_drawn():
+    image = bpy.data.images[IMAGE]
+    pixels = np.empty(np.prod(image.size) * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    assert len(np.unique(pixels)) > 10, "Blender brings the image back without its pixels"
+
+
+def test_an_image_of_the_same_name_is_left_alone(scene):
+    mine = bpy.data.images.new(IMAGE, 8, 8)
+    compare()
+    assert set(bpy.data.images.keys()) == {IMAGE, f"{IMAGE}.001"}
+    keep(side="BLE")
+    assert bpy.data.images.keys() == [IMAGE] and bpy.data.images[0] == mine
+    select(*scene)
+    compare()
+    discard()
+    assert bpy.data.images.keys() == [IMAGE]
 
 
 def test_too_many_maps_are_refused_in_words(scene):
