@@ -75,6 +75,7 @@ class _Shown:
 
     fill, seams = "", False
     kept = {}  # by `session_uid` of the object
+    layer = None  # the view layer that these are of, as `_layer` tells it
     handle = None
     changed_at = None  # when something changed last that is not made anew yet
 
@@ -156,8 +157,13 @@ def refresh(context):
             kept[obj.session_uid] = old
         else:
             kept[obj.session_uid] = _make(obj, settings, depsgraph)
-    _Shown.kept = kept
+    _Shown.kept, _Shown.layer = kept, _layer(context)
     _Shown.changed_at = None
+
+
+def _layer(context):
+    """What tells the view layer of a context, or of a window, from others."""
+    return context.scene.session_uid, context.view_layer.name
 
 
 def _make(obj, settings, depsgraph):
@@ -200,6 +206,11 @@ def _draw():
 
     context = bpy.context
     view = context.space_data
+    if _layer(context) != _Shown.layer:
+        # Windows may show several scenes: it is shown in one, so that they do not take it from each other for ever.
+        if not any(_layer(window) == _Shown.layer for window in context.window_manager.windows):
+            _later(SOON_SECONDS)
+        return
     settings = _settings(context)
     if {obj.session_uid for obj in _targets(context)} != set(_Shown.kept):
         _later(SOON_SECONDS)
@@ -209,8 +220,7 @@ def _draw():
         if obj is None or context.view_layer.objects.get(obj.name) != obj:
             continue
         if not _is_drawn(kept, obj, settings):
-            if not kept.changed:
-                _later(SOON_SECONDS)
+            _later(SOON_SECONDS)
         elif kept.picture is not None and obj.visible_get(viewport=view) and view.overlay.show_overlays:
             shown.append((kept, obj.matrix_world.copy(), obj.mode == "EDIT"))
     try:
@@ -235,7 +245,11 @@ def _settle():
         left = QUIET_SECONDS - (time.monotonic() - _Shown.changed_at)
         if left > 0:
             return left
-    refresh(bpy.context)
+    try:
+        refresh(bpy.context)
+    except Exception:
+        turn_off()  # told once, not again and again
+        raise
     redraw()
     return None
 

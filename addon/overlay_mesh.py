@@ -12,6 +12,10 @@ from . import overlay_colours, seams, uv_islands
 from .mesh_arrays import read_array, read_corner_vertices, read_face_offsets, read_positions
 from .triangle_shapes import Shapes
 
+# UVs that are nearer to each other are one place: modifiers compute those of each face by themselves, and round. It is
+# a sixteenth of a pixel at 8192. A power of two, so that UVs at pixels lie in the middle of what is rounded to one.
+TOLERANCE = 2.0**-17
+
 
 @dataclass
 class Surface:
@@ -59,7 +63,7 @@ def read(obj, map_name, depsgraph):
             visible = ~read_array(mesh.polygons, "hide", bool)
         face_of_corner = np.repeat(np.arange(len(visible)), np.diff(offsets))
         edges = read_array(mesh.edges, "vertices", np.int32, 2)
-        cut = seams.chart_borders(mesh, uv)
+        cut = seams.chart_borders(mesh, uv, tolerance=TOLERANCE)
         if not visible.all():
             seen = np.zeros(len(edges), bool)
             seen[read_array(mesh.loops, "edge_index", np.int32)[visible[face_of_corner]]] = True
@@ -88,7 +92,7 @@ def picture(surface, kind, *, matrix, texture_size, first=0):
             surface.positions,
             surface.corner_vertices,
             surface.face_offsets,
-            surface.uv,
+            np.round(surface.uv / np.float32(TOLERANCE)) * np.float32(TOLERANCE),
             np.zeros(surface.face_count, np.int32),
         )
         if kind == "STRETCH":

@@ -192,6 +192,23 @@ def test_modifiers_are_drawn_upon(turn_on, pictures):
     assert len(picture.positions) == 3 * 16 and picture.positions[:, 0].max() > 2.9
 
 
+def test_what_modifiers_round_is_no_cut(turn_on, pictures):
+    obj = sphere(cells=6)
+    select(obj)
+    bpy.ops.uv.ble_unwrap()
+    turn_on("ISLANDS")
+    turn_on("SEAMS")
+    before = pictures()["Sphere"]
+    turn_on("ISLANDS")
+    turn_on("SEAMS")
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 3
+    turn_on("ISLANDS")
+    turn_on("SEAMS")
+    after = pictures()["Sphere"]
+    assert len(before.lines) and len(after.lines) == 8 * len(before.lines), "each side became eight"
+    assert len(np.unique(after.colours, axis=0)) == len(np.unique(before.colours, axis=0))
+
+
 def test_objects_that_share_a_mesh_are_both_shown(turn_on, pictures):
     obj = flat_grid(2)
     twin = bpy.data.objects.new("Twin", obj.data)
