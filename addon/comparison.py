@@ -6,6 +6,7 @@ import time
 import bpy
 
 from . import measurement, mesh_bridge, properties, surface_report, textures
+from .certificate import STRETCH_SLACK
 from .faces import uv_selected_faces
 from .task import unwrap_objects
 
@@ -15,6 +16,16 @@ SMART_MAP = "Smart UV Project"
 # Angle limits in degrees among which Smart UV Project may pick its best; 66 is its own default.
 DEFAULT_ANGLE = 66
 ANGLES = (30, 45, 66, 80)
+
+# Settings under which ours does what Smart UV Project does: it fills one texture with all faces, and lays nothing on
+# anything.
+ALIKE = {
+    "use_selection": False,
+    "use_original_bounds": False,
+    "stack": "OFF",
+    "tiles": 1,
+    "texel_density": 0.0,
+}
 
 
 def smart_uv(objects, *, margin, texture_size, angle=DEFAULT_ANGLE, map_name=SMART_MAP):
@@ -47,8 +58,8 @@ def measure_active(objects, *, margin, texture_size):
     return measurement.measure(selection, held, texture_size=texture_size, margin=margin)
 
 
-def best_smart_uv(objects, *, margin, texture_size, angles=ANGLES, map_name=SMART_MAP):
-    """Smart UV Project at its best angle: fewest overlaps and flips, then least stretch.
+def best_smart_uv(objects, *, margin, texture_size, angles=ANGLES, map_name=SMART_MAP, rank=None):
+    """Smart UV Project at its best angle: fewest overlaps and flips, then least stretch, or least by `rank`.
 
     Returns {angle: measurement with "seconds_total"} and the best angle; its UVs are left in the map.
     """
@@ -57,7 +68,7 @@ def best_smart_uv(objects, *, margin, texture_size, angles=ANGLES, map_name=SMAR
         seconds = smart_uv(objects, margin=margin, texture_size=texture_size, angle=angle, map_name=map_name)
         results[angle] = measure_active(objects, margin=margin, texture_size=texture_size)
         results[angle]["seconds_total"] = seconds
-    best = min(results, key=lambda angle: _rank(results[angle]))
+    best = min(results, key=lambda angle: (rank or _rank)(results[angle]))
     if best != angles[-1]:
         smart_uv(objects, margin=margin, texture_size=texture_size, angle=best, map_name=map_name)
     return results, best
@@ -72,13 +83,8 @@ def compare(objects, settings, *, angles=ANGLES, threads=0, progress=None):
     settings = {
         **properties.default_values(settings.get("preset", "DEFAULT")),
         **settings,
-        "use_selection": False,
+        **ALIKE,
         "uv_map": "ACTIVE",
-        "use_original_bounds": False,
-        # Smart UV Project fills one texture, and lays nothing on anything.
-        "stack": "OFF",
-        "tiles": 1,
-        "texel_density": 0.0,
     }
     objects = mesh_bridge.unique_meshes(objects)
     if settings["correct_aspect"]:
@@ -115,11 +121,26 @@ def activate_map(objects, name):
 
 
 def _rank(measured):
-    stretch = measured.get("l2")
-    return (
-        int(measured.get("overlaps") or 0) + int(measured.get("flips") or 0),
-        stretch if stretch is not None and math.isfinite(stretch) else math.inf,
-    )
+    return _faults(measured), _finite(measured.get("l2"))
+
+
+def short_seams(stretch_limit):
+    """A rank after what ours aims at: fewest overlaps and flips, no island beyond the limit, then shortest seams."""
+
+    def rank(measured):
+        worst = _finite(measured.get("l2_worst_chart"))
+        beyond = worst if worst > stretch_limit + STRETCH_SLACK else 0.0
+        return _faults(measured), beyond, _finite(measured.get("seam_length_absolute"))
+
+    return rank
+
+
+def _faults(measured):
+    return int(measured.get("overlaps") or 0) + int(measured.get("flips") or 0)
+
+
+def _finite(value):
+    return value if value is not None and math.isfinite(value) else math.inf
 
 
 def overlapping_faces(objects):

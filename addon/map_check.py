@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import check_report, map_state, measurement, mesh_bridge, textures, units, uv_islands
+from . import check_report, map_state, measurement, mesh_bridge, textures, triangle_shapes, units, uv_islands
 from .island_choice import part_of_face
 from .mesh_arrays import MeshError
+from .triangle_shapes import Shapes
 
 ALL_TILES = 100  # as many as the native module knows: maps of others may use any
 # Islands with less than this share of the surface are left out where densities are compared.
@@ -58,10 +59,10 @@ def check(objects, settings, *, threads=0):
         by_face=True,
     )
     measured |= {"stacked": int((stack >= 0).sum()), "stacks": int(stack.max(initial=-1)) + 1}
-    shapes = _Shapes.of(selection, uv, size)
+    shapes = Shapes.of(selection, uv, size)
     measured |= _densities(island, shapes)
     limit = settings["stretch_limit"]
-    mirrored = _mirrored(island, shapes)
+    mirrored = triangle_shapes.mirrored(island, shapes)
     measured["mirrored"] = int(mirrored.sum())
     faults = _faults(measured, island, stack, shapes, limit)
     faults["MIRRORED"] = (island >= 0) & np.append(mirrored, False)[island]
@@ -81,38 +82,6 @@ def check(objects, settings, *, threads=0):
     )
 
 
-@dataclass
-class _Shapes:
-    """What each triangle of a selection is on the surface and in pixels."""
-
-    face: np.ndarray  # (t,)
-    surface: np.ndarray  # (t,) area
-    pixels: np.ndarray  # (t,) area, negative where it is seen from behind
-    longest: np.ndarray  # (t,) most that a line is longer on the surface than in pixels
-    shortest: np.ndarray  # (t,) least
-
-    @classmethod
-    def of(cls, selection, uv, size):
-        triangles = selection.corner_triangles
-        if triangles is None:
-            triangles = np.arange(len(uv), dtype=np.int32).reshape(-1, 3)
-        face = np.repeat(np.arange(selection.face_count), np.diff(selection.face_offsets))[triangles[:, 0]]
-        with np.errstate(all="ignore"):
-            a, b, c = selection.positions.astype(np.float64)[selection.corner_vertices[triangles]].transpose(1, 0, 2)
-            one, other = b - a, c - a
-            surface = 0.5 * np.linalg.norm(np.cross(one, other), axis=1)
-            a, b, c = (uv.astype(np.float64) * size)[triangles].transpose(1, 0, 2)
-            (ax, ay), (bx, by) = (b - a).T, (c - a).T
-            twice = ax * by - ay * bx
-            along_u = (one * by[:, None] - other * ay[:, None]) / twice[:, None]
-            along_v = (other * ax[:, None] - one * bx[:, None]) / twice[:, None]
-            uu, uv_, vv = ((p * q).sum(axis=1) for p, q in ((along_u, along_u), (along_u, along_v), (along_v, along_v)))
-            longest = np.sqrt(0.5 * (uu + vv + np.hypot(uu - vv, 2 * uv_)))
-            pixels = 0.5 * twice
-            shortest = surface / np.abs(pixels) / longest
-        return cls(face, surface, pixels, longest, shortest)
-
-
 def _densities(island, shapes):
     """Pixels for each unit of length: over all, and of the islands that have least and most."""
     count = int(island.max(initial=-1)) + 1
@@ -127,13 +96,6 @@ def _densities(island, shapes):
         "density": float(np.sqrt(sums[1].sum() / sums[0].sum())),
         "densities": (float(each.min()), float(each.max())),
     }
-
-
-def _mirrored(island, shapes):
-    """Which islands lie in the map as they look from behind, for the most part, (k,) bool."""
-    of = island[shapes.face]
-    known = (of >= 0) & np.isfinite(shapes.pixels)
-    return np.bincount(of[known], shapes.pixels[known], int(island.max(initial=-1)) + 1) < 0
 
 
 def _faults(measured, island, stack, shapes, limit):
@@ -167,7 +129,9 @@ def _stretched(measured, shapes, limit):
     beyond = np.append(np.nan_to_num(beyond, nan=0.0) > too_much, False)  # the last is for faces without UVs
     asked = np.flatnonzero(beyond[chart[shapes.face]] & np.isfinite(shapes.longest) & np.isfinite(shapes.shortest))
     of = chart[shapes.face[asked]]
-    usual = _medians(np.sqrt(shapes.longest[asked] * shapes.shortest[asked]), shapes.surface[asked], of, len(beyond))
+    usual = triangle_shapes.medians(
+        np.sqrt(shapes.longest[asked] * shapes.shortest[asked]), shapes.surface[asked], of, len(beyond)
+    )
     off = np.maximum(shapes.longest[asked] / usual[of], usual[of] / shapes.shortest[asked])
     worst = np.zeros(len(beyond))
     np.maximum.at(worst, of, off)
@@ -175,17 +139,3 @@ def _stretched(measured, shapes, limit):
     found = np.zeros(len(chart), bool)
     found[shapes.face[asked[off > least[of]]]] = True
     return found
-
-
-def _medians(values, weights, group, count):
-    """The median of values by weight in each of `count` groups; 1 where there is no value."""
-    order = np.lexsort([values, group])
-    group, sums = group[order], np.cumsum(weights[order])
-    medians = np.ones(count)
-    if len(order):
-        first = np.flatnonzero(np.append(True, group[1:] != group[:-1]))
-        last = np.append(first[1:], len(order)) - 1
-        before = np.where(first > 0, sums[first - 1], 0.0)
-        middle = np.searchsorted(sums, 0.5 * (before + sums[last]))
-        medians[group[first]] = values[order[np.clip(middle, first, last)]]
-    return medians

@@ -4,7 +4,7 @@ import json
 
 import bpy
 
-from . import last_check, last_result, properties, targets
+from . import last_check, last_comparison, last_result, overlay, overlay_colours, overlay_legend, properties, targets
 
 CATEGORY = "BLE Unwrap"
 STATUS_ICONS = {"HEAD": "DOT", "OK": "CHECKMARK", "BAD": "ERROR", "WARN": "INFO", "INFO": "BLANK1"}
@@ -116,6 +116,55 @@ class _Check:
                 row.operator("mesh.ble_unwrap_select_faulty", text="Select", icon="FACESEL").kind = line.kind
 
 
+class _Show:
+    bl_label = "Show"
+    bl_category = CATEGORY
+    bl_region_type = "UI"
+
+    def draw(self, _context):
+        layout = self.layout
+        row = layout.row(align=True)
+        for kind, text in (("CHECKER", "Checker"), ("STRETCH", "Stretch"), ("ISLANDS", "Islands")):
+            row.operator("uv.ble_unwrap_show", text=text, depress=overlay.is_shown(kind)).kind = kind
+        layout.operator("uv.ble_unwrap_show", text="Seams", depress=overlay.is_shown("SEAMS")).kind = "SEAMS"
+        if not overlay.is_shown("STRETCH"):
+            return
+        column = layout.column(align=True)
+        column.label(text="Lines of the texture on the surface:")
+        for icon, text in overlay_legend.lines():
+            column.label(text=text, icon_value=icon)
+        if factors := overlay.worst():
+            column.label(text=f"Worst here: {overlay_colours.range_text(*factors)}")
+
+
+class _Compare:
+    bl_label = "Compare"
+    bl_category = CATEGORY
+    bl_region_type = "UI"
+
+    def draw(self, _context):
+        layout = self.layout
+        if not last_comparison.is_there():
+            layout.operator_context = "INVOKE_DEFAULT"
+            layout.operator("uv.ble_unwrap_compare", icon="MOD_UVPROJECT")
+            return
+        layout.label(text=last_comparison.title(), icon="UV")
+        table = layout.column(align=True)
+        for label, *texts in (("", "BLE Unwrap", "Smart UV"), *last_comparison.rows()):
+            row = table.split(factor=0.36)
+            row.label(text=label)
+            row = row.split(factor=0.5)
+            for text in texts:
+                row.label(text=text)
+        for side, name in (("BLE", "BLE Unwrap"), ("SMART", "Smart UV")):
+            row = layout.split(factor=0.36)
+            row.label(text=name)
+            row = row.row(align=True)
+            row.operator("uv.ble_unwrap_look", text="", icon="HIDE_OFF").side = side
+            row.operator("uv.ble_unwrap_keep", icon="CHECKMARK").side = side
+        layout.operator("uv.ble_unwrap_discard", icon="X")
+
+
 class _Advanced:
     bl_label = "Advanced"
     bl_category = CATEGORY
@@ -162,6 +211,16 @@ class IMAGE_PT_ble_unwrap_check(_Check, bpy.types.Panel):
     bl_parent_id = "IMAGE_PT_ble_unwrap"
 
 
+class IMAGE_PT_ble_unwrap_show(_Show, bpy.types.Panel):
+    bl_space_type = "IMAGE_EDITOR"
+    bl_parent_id = "IMAGE_PT_ble_unwrap"
+
+
+class IMAGE_PT_ble_unwrap_compare(_Compare, bpy.types.Panel):
+    bl_space_type = "IMAGE_EDITOR"
+    bl_parent_id = "IMAGE_PT_ble_unwrap"
+
+
 class IMAGE_PT_ble_unwrap_advanced(_Advanced, bpy.types.Panel):
     bl_space_type = "IMAGE_EDITOR"
     bl_parent_id = "IMAGE_PT_ble_unwrap"
@@ -181,6 +240,16 @@ class VIEW3D_PT_ble_unwrap_check(_Check, bpy.types.Panel):
     bl_parent_id = "VIEW3D_PT_ble_unwrap"
 
 
+class VIEW3D_PT_ble_unwrap_show(_Show, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "VIEW3D_PT_ble_unwrap"
+
+
+class VIEW3D_PT_ble_unwrap_compare(_Compare, bpy.types.Panel):
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "VIEW3D_PT_ble_unwrap"
+
+
 class VIEW3D_PT_ble_unwrap_advanced(_Advanced, bpy.types.Panel):
     bl_space_type = "VIEW_3D"
     bl_parent_id = "VIEW3D_PT_ble_unwrap"
@@ -190,10 +259,14 @@ CLASSES = (
     IMAGE_PT_ble_unwrap,
     IMAGE_PT_ble_unwrap_certificate,
     IMAGE_PT_ble_unwrap_check,
+    IMAGE_PT_ble_unwrap_show,
+    IMAGE_PT_ble_unwrap_compare,
     IMAGE_PT_ble_unwrap_advanced,
     VIEW3D_PT_ble_unwrap,
     VIEW3D_PT_ble_unwrap_certificate,
     VIEW3D_PT_ble_unwrap_check,
+    VIEW3D_PT_ble_unwrap_show,
+    VIEW3D_PT_ble_unwrap_compare,
     VIEW3D_PT_ble_unwrap_advanced,
 )
 

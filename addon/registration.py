@@ -1,11 +1,23 @@
 """Registers the add-on's modules in order, and takes them back in reverse."""
 
-from . import command, last_check, last_result, menu, panel, preferences, properties
-from .operators import align, check, pack, select_edges, select_faulty, select_narrow, unwrap
+from . import (
+    command,
+    last_check,
+    last_comparison,
+    last_result,
+    menu,
+    overlay,
+    overlay_legend,
+    panel,
+    preferences,
+    properties,
+)
+from .operators import align, check, compare, pack, select_edges, select_faulty, select_narrow, unwrap
+from .operators import overlay as show
 
 MODULES = (
-    *(preferences, properties, last_result, last_check),
-    *(unwrap, pack, align, check, select_edges, select_narrow, select_faulty),
+    *(preferences, properties, last_result, last_check, last_comparison, overlay, overlay_legend),
+    *(unwrap, pack, align, check, show, compare, select_edges, select_narrow, select_faulty),
     *(panel, menu, command),
 )
 

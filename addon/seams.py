@@ -43,7 +43,7 @@ def mark_chart_borders(mesh, uv, source_faces, chart=None):
     """
     seams, ours = read_array(mesh.edges, "use_seam", bool), remembered(mesh)
     looked_at = _edges_of(mesh, source_faces)
-    border = _chart_borders(mesh, uv, chart) & looked_at
+    border = chart_borders(mesh, uv, chart) & looked_at
     own_left = ours & seams
     cleared = ours & ~seams & (border | ~looked_at) if own_left.any() else np.zeros_like(ours)
     wished = seams & ~ours
@@ -75,8 +75,8 @@ def _edges_of(mesh, faces):
     return result
 
 
-def _chart_borders(mesh, uv, chart):
-    """Edges where the UVs, or the charts, of two neighbouring faces differ, (e,) bool."""
+def chart_borders(mesh, uv, chart=None, tolerance=0.0):
+    """Edges where the UVs, by more than a tolerance, or the charts of two neighbouring faces differ, (e,) bool."""
     corner_vertices = read_corner_vertices(mesh)
     offsets = read_face_offsets(mesh)
     corner_edges = read_array(mesh.loops, "edge_index", np.int32)
@@ -88,7 +88,9 @@ def _chart_borders(mesh, uv, chart):
     ends[turned] = ends[turned][:, [2, 3, 0, 1]]
     first = np.full(len(mesh.edges), -1, np.int32)
     first[corner_edges[::-1]] = np.arange(len(corner_edges) - 1, -1, -1, dtype=np.int32)
-    differs = (ends != ends[first[corner_edges]]).any(axis=1)
+    others = ends[first[corner_edges]]
+    with np.errstate(invalid="ignore"):  # what is not finite differs
+        differs = ((ends != others) & ~(np.abs(ends - others) <= tolerance)).any(axis=1)
     if chart is not None:
         differs |= chart != chart[first[corner_edges]]
     border = np.zeros(len(mesh.edges), bool)

@@ -50,7 +50,7 @@ class UnwrapTask:
     Raises `mesh_bridge.MeshError`, `engine.EngineMissing`, `engine.EngineError`; whenever it does, no mesh was changed.
     """
 
-    def __init__(self, objects, settings, *, threads=0, keep=False, by_uv=False):
+    def __init__(self, objects, settings, *, threads=0, keep=False, by_uv=False, whole=False):
         self.objects = list(objects)
         self.settings = {**properties.default_values(settings.get("preset", "DEFAULT")), **settings}
         self.target = uv_maps.chosen(self.settings)
@@ -58,6 +58,7 @@ class UnwrapTask:
             objects,
             only_selected=self.settings["use_selection"],
             by_uv=by_uv,
+            whole=whole,
             target=self.target,
             move_pinned=self.settings["move_pinned"],
             **{name: self.settings[name] for name in ("sharp_angle", "seams_away", "seams_here")},
