@@ -25,6 +25,7 @@ def draw_island_entries(self, _context):
     self.layout.operator_context = "INVOKE_DEFAULT"
     self.layout.operator("uv.ble_unwrap_pack")
     self.layout.operator("uv.ble_unwrap_align")
+    self.layout.operator("uv.ble_unwrap_relax")
 
 
 def register():

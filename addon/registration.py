@@ -1,11 +1,11 @@
 """Registers the add-on's modules in order, and takes them back in reverse."""
 
 from . import command, last_check, last_result, menu, panel, preferences, properties
-from .operators import align, check, pack, select_edges, select_faulty, select_narrow, unwrap
+from .operators import align, check, pack, relax, select_edges, select_faulty, select_narrow, unwrap
 
 MODULES = (
     *(preferences, properties, last_result, last_check),
-    *(unwrap, pack, align, check, select_edges, select_narrow, select_faulty),
+    *(unwrap, pack, align, relax, check, select_edges, select_narrow, select_faulty),
     *(panel, menu, command),
 )
 
