@@ -53,14 +53,7 @@ pub(crate) fn minimise_pinned(
         (mesh.face_count(), mesh.vertex_count(), mesh.vertex_count()),
         "a rest triangle a face, a point and a mark a vertex"
     );
-    let mut sound = start.to_vec();
-    if first_flip(mesh, start).is_some() {
-        sound = clear_with_halves(mesh, rest, &OtherHalves::default(), pinned, sound, progress)?;
-        put_back(start, pinned, &mut sound);
-        if first_flip(mesh, &sound).is_some() {
-            return Ok(PinnedMap::Flipped);
-        }
-    }
+    let Some(sound) = cleared(mesh, rest, start, pinned, progress)? else { return Ok(PinnedMap::Flipped) };
     let free = StretchSettings { solver: Solver::Newton, ..settings.clone() };
     let free = minimise_stretch(mesh, rest, &sound, &free, &MinimiseOptions::default(), progress)?;
     // Were the map at its own scale, the pins would drag spikes out of it, or crush it, before all of it followed them.
@@ -76,6 +69,30 @@ pub(crate) fn minimise_pinned(
     }
     let (uv, more) = relax_pinned(mesh, rest, pinned, &sound, scale, Some(BOUNDARY_REACH), settings, progress)?;
     Ok(PinnedMap::Relaxed { uv, iterations: iterations + more })
+}
+
+/// The map without flips, with the pinned vertices where they were; `None` where the flips do not yield. Where the boundary is
+/// simple it stays as it is, if that is possible: what a pin has folded lies inside as a rule.
+fn cleared(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    start: &[Point2<f64>],
+    pinned: &[bool],
+    progress: &Progress,
+) -> Result<Option<Vec<Point2<f64>>>, StretchError> {
+    if first_flip(mesh, start).is_none() {
+        return Ok(Some(start.to_vec()));
+    }
+    let border = || mesh.vertices().map(|v| pinned[v.index()] || mesh.is_boundary_vertex(v)).collect();
+    let with_border: Option<Vec<bool>> = boundary_is_simple(mesh, start).then(border);
+    for held in with_border.as_deref().into_iter().chain([pinned]) {
+        let mut uv = clear_with_halves(mesh, rest, &OtherHalves::default(), held, start.to_vec(), progress)?;
+        put_back(start, held, &mut uv);
+        if first_flip(mesh, &uv).is_none() {
+            return Ok(Some(uv));
+        }
+    }
+    Ok(None)
 }
 
 /// How far apart the pinned points are: the root of their mean squared distance from their middle.
