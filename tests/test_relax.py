@@ -134,6 +134,20 @@ def test_two_pins_give_scale_and_turn():
     assert report["l2_after"] < 1.01
 
 
+@pytest.mark.parametrize("far", [0.05, 0.15, 0.3])
+def test_a_pin_that_was_dragged_takes_the_rest_along(far):
+    mesh, plan = grid(30, height=0.3)
+    corners = np.isin(plan, (0, 1)).all(axis=1)
+    dragged = np.isclose(plan, 0.5).all(axis=1)
+    uv = np.where(dragged[:, None], plan + np.array([far, 0.02]), plan).astype(np.float32)
+    assert native.measure(*mesh, uv)["flips"] > 0
+    found, report = relaxed(mesh, uv, pinned=corners | dragged)
+    assert report["relaxed"] == 1, report["islands"]
+    assert_array_equal(found[corners | dragged], uv[corners | dragged])
+    measured = native.measure(*mesh, found)
+    assert (measured["flips"], measured["overlaps"]) == (0, 0) and measured["l2"] < 1.1
+
+
 def test_flips_and_overlap_are_cleared_unless_pins_forbid_it():
     mesh, plan = grid(10)
     folded = np.column_stack([np.abs(plan[:, 0] - 0.45), plan[:, 1]])
@@ -144,6 +158,30 @@ def test_flips_and_overlap_are_cleared_unless_pins_forbid_it():
     assert_array_equal(found, folded.astype(np.float32))
     assert report["islands"][0]["left"] == "its pinned vertices turn faces over"
     assert np.isnan(report["l2_after"]), "nothing was relaxed"
+
+
+def test_islands_may_start_anew():
+    """A sheet rolled to more than a turn, whose map lies on itself: what no relaxing undoes an embedding does."""
+    (positions, corners, offsets), plan = grid(16, height=0.0)
+    angle = 7 * positions[:, 0]
+    mesh = (np.column_stack([np.cos(angle) / 7, np.sin(angle) / 7, positions[:, 1]]), corners, offsets)
+    uv = 0.3 + 0.5 * mesh[0][corners] @ np.array([[1, 0], [0, 1], [0, 0.1]])
+    found, report = relaxed(mesh, uv, start="anew")
+    assert report["relaxed"] == 1 and report["l2_after"] < 1.001
+    assert_allclose(np.abs(areas(found)).sum(), np.abs(areas(uv)).sum(), rtol=1e-4)
+    assert_allclose(centroid(found), centroid(uv), atol=1e-5)
+    assert len(set(places(mesh, found))) == len(set(places(mesh, uv)))
+    # Pins hold, and what has the least stretch already stays as it is.
+    mesh, plan = grid(12)
+    pinned = plan[:, 0] == 0
+    found, report = relaxed(mesh, 0.3 * plan, pinned=pinned, start="anew")
+    assert report["relaxed"] == 1
+    assert_array_equal(bits(found)[pinned], bits(0.3 * plan)[pinned])
+    good, first = relaxed(mesh, 0.3 * plan)
+    _, again = relaxed(mesh, good, start="anew")
+    assert again["l2_after"] == pytest.approx(first["l2_after"], abs=1e-3)
+    with pytest.raises(native.InvalidArgumentError, match="start: expected 'as_they_are' or 'anew'"):
+        relaxed(mesh, plan, start="again")
 
 
 def test_seams_stay_and_only_selected_islands_move():

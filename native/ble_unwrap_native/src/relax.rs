@@ -1,7 +1,7 @@
 //! `relax`.
 
 use ble_unwrap_core::settings::Function;
-use ble_unwrap_core::standalone::{RelaxRules, Relaxed, RelaxedIsland, relax as relax_islands};
+use ble_unwrap_core::standalone::{RelaxRules, RelaxStart, Relaxed, RelaxedIsland, relax as relax_islands};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -61,6 +61,9 @@ impl RelaxedMap {
 ///     Corners that stay where they are, with all that are joined to them.
 /// selected : (f,) bool, optional
 ///     Faces whose islands are relaxed; all, if absent.
+/// start : {"as_they_are", "anew"}
+///     ``"as_they_are"``: islands are relaxed from how they are. ``"anew"``: each is embedded anew, as ``unwrap`` does it, whatever its shape was;
+///     its outline on the surface, and so the seams, stay the same, and it goes back to where it was.
 /// job : Job, optional
 ///     A new ``Job``, by which another thread watches or cancels this call.
 /// weld, weld_distance : bool, float or None
@@ -101,7 +104,8 @@ impl RelaxedMap {
 ///
 /// Smith, Schaefer: Bijective parameterization with free boundaries, ACM TOG 2015.
 #[pyfunction]
-#[pyo3(signature = (positions, corner_vertices, face_offsets, uv, *, pinned=None, selected=None, corner_triangles=None, job=None, **settings))]
+#[pyo3(signature = (positions, corner_vertices, face_offsets, uv, *, pinned=None, selected=None, start=None, corner_triangles=None, job=None, **settings),
+    text_signature = "(positions, corner_vertices, face_offsets, uv, *, pinned=None, selected=None, start='as_they_are', corner_triangles=None, job=None, **settings)")]
 #[expect(clippy::too_many_arguments, reason = "they are the keywords of a Python function")]
 pub(crate) fn relax(
     py: Python<'_>,
@@ -111,6 +115,7 @@ pub(crate) fn relax(
     uv: &Bound<'_, PyAny>,
     pinned: Option<&Bound<'_, PyAny>>,
     selected: Option<&Bound<'_, PyAny>>,
+    start: Option<&Bound<'_, PyAny>>,
     corner_triangles: Option<&Bound<'_, PyAny>>,
     job: Option<Bound<'_, Job>>,
     settings: Option<&Bound<'_, PyDict>>,
@@ -121,11 +126,13 @@ pub(crate) fn relax(
     let pinned = pinned.map(|given| arrays::flags(given, Argument { name: "pinned", shape: "(c,)" })).transpose()?;
     let selected =
         selected.map(|given| arrays::flags(given, Argument { name: "selected", shape: "(f,)" })).transpose()?;
+    let starts = [("as_they_are", RelaxStart::AsTheyAre), ("anew", RelaxStart::Anew)];
+    let start = start.map(|given| settings::one_of("start", &starts, given)).transpose()?.unwrap_or_default();
     let job = Job::given_or_new(py, job)?;
     job.get().start(
         call.threads,
         move |progress| {
-            let rules = RelaxRules { pinned: pinned.as_deref(), selected: selected.as_deref() };
+            let rules = RelaxRules { pinned: pinned.as_deref(), selected: selected.as_deref(), start };
             relax_islands(&mesh.input(), &uv, &rules, &call.settings, progress).map_err(Failure::from)
         },
         move |py, relaxed| {

@@ -13,7 +13,7 @@ pub use distances::{DistancesError, surface_distances};
 pub use flatten::{FlattenError, FlattenReport, Flattening, MapQuality, flatten};
 pub use graph::{CloudDistanceSettings, CloudDistancesError, Connect, cloud_distances};
 pub use layout::{FaceMeasures, LayoutError, LayoutMeasures, certify, measure_layout};
-pub use relax::{LeftAsItWas, RelaxError, RelaxRules, Relaxed, RelaxedIsland, relax};
+pub use relax::{LeftAsItWas, RelaxError, RelaxRules, RelaxStart, Relaxed, RelaxedIsland, relax};
 pub use repack::{RepackError, RepackRules, RepackScale, Repacked, repack};
 
 pub use crate::geodesics::{Connectivity, Piece};

@@ -24,6 +24,18 @@ use part::{Frame, Part, Stop};
 /// An island whose stretch would fall by no more than this share is not moved: single precision resolves no less.
 const LEAST_GAIN: f64 = 1e-6;
 
+/// What the islands are relaxed from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RelaxStart {
+    /// From how they are.
+    #[default]
+    AsTheyAre,
+    /// From an embedding of each island by itself, as [`unwrap`](crate::unwrap()) makes it, whatever shape the island had: for islands too far
+    /// from flat to be relaxed well. Their outlines, and so their seams, stay the same on the surface.
+    Anew,
+}
+
 /// What [`relax`] keeps to besides its settings. The default holds nothing and relaxes all islands.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RelaxRules<'a> {
@@ -31,6 +43,8 @@ pub struct RelaxRules<'a> {
     pub pinned: Option<&'a [bool]>,
     /// For each face, whether the island that it belongs to is relaxed. One such face is enough.
     pub selected: Option<&'a [bool]>,
+    /// What the islands are relaxed from.
+    pub start: RelaxStart,
 }
 
 /// Why no island could be relaxed.
@@ -143,7 +157,7 @@ pub struct Relaxed {
 /// UV in both. The `rules` say which corners are pinned, and which islands are meant. The minimisation is the one that
 /// [`unwrap`](crate::unwrap()) ends with: Newton's method, whatever [`solver`](crate::settings::StretchSettings::solver)
 /// says, with the number of iterations and the tolerance that `settings.stretch` has. Of the other settings, only those of
-/// welding and the proportions of the texture matter. Seams, guides and weights of the `input` are not looked at.
+/// welding, of distances and embedding if the islands are to [start anew](RelaxStart::Anew), and the proportions of the texture matter. Seams, guides and weights of the `input` are not looked at.
 ///
 /// Guaranteed:
 /// - Corners that were joined are joined afterwards, to the bit, and no others are joined.
@@ -200,7 +214,8 @@ pub fn relax(
         aspect: texture.aspect(),
         texel: texture.texels().map(|texels| 1.0 / texels),
         diagonal: surface.diagonal,
-        settings: &settings.stretch,
+        settings,
+        is_anew: rules.start == RelaxStart::Anew,
         progress,
     };
     let meant = layout.meant(rules);

@@ -525,6 +525,7 @@ def relax(
     *,
     pinned: Buffer | None = None,
     selected: Buffer | None = None,
+    start: Literal["as_they_are", "anew"] | None = "as_they_are",
     corner_triangles: Buffer | None = None,
     job: Job | None = None,
     **settings: Unpack[_RelaxSettings],

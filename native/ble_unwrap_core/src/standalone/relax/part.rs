@@ -4,10 +4,13 @@ use nalgebra::{Point2, Rotation2, Vector2};
 use thiserror::Error;
 
 use crate::distortion::RestTriangle;
+use crate::embedding::EmbeddingError;
+use crate::flattening::Steps;
+use crate::geodesics;
 use crate::mesh::{self, TriMesh};
 use crate::progress::{Cancelled, Progress};
 use crate::rounding::{Rounding, RoundingError, round_to_f32};
-use crate::settings::{Solver, StretchSettings};
+use crate::settings::{Settings, Solver, StretchSettings};
 use crate::stretch::{self, BOUNDARY_REACH, MinimiseOptions, PinnedMap, StretchError, TutteBoundary};
 
 /// Triangles flatter than [`RestTriangle::MIN_HEIGHT`] are relaxed as if they had that height. A part that has less than
@@ -110,7 +113,9 @@ pub(super) struct Frame<'a> {
     pub(super) texel: [f64; 2],
     /// The diagonal of the whole surface, in the unit of the parts' positions.
     pub(super) diagonal: f64,
-    pub(super) settings: &'a StretchSettings,
+    pub(super) settings: &'a Settings,
+    /// Whether parts are embedded anew, whatever their shape was.
+    pub(super) is_anew: bool,
     pub(super) progress: &'a Progress,
 }
 
@@ -169,11 +174,18 @@ impl Part<'_> {
         let start: Vec<Point2<f64>> = before.iter().map(|p| p * scale).collect();
         let was_sound = is_sound(self.mesh, &turned);
 
+        let embedded = if frame.is_anew { self.embedded(frame)? } else { None };
         let (found, iterations) = if held < 2 {
-            let (found, iterations) = self.free(&rest, &start, frame)?;
+            let (found, iterations) = self.free(&rest, embedded.as_deref().unwrap_or(&start), frame)?;
             (self.laid_back(&rest, &before, &found), iterations)
         } else {
-            match stretch::minimise_pinned(self.mesh, &rest, &start, self.held, frame.settings, frame.progress) {
+            let mut start = start;
+            if let Some(embedded) = embedded {
+                let (found, _) = self.free(&rest, &embedded, frame)?;
+                self.lay_on_held(&found, &mut start);
+            }
+            match stretch::minimise_pinned(self.mesh, &rest, &start, self.held, &frame.settings.stretch, frame.progress)
+            {
                 Ok(PinnedMap::Relaxed { uv, iterations }) => (uv.iter().map(|p| p / scale).collect(), iterations),
                 Ok(PinnedMap::Flipped) => return Err(LeftAsItWas::PinsTurnFacesOver.into()),
                 Ok(PinnedMap::Overlapping) => return Err(LeftAsItWas::PinsOverlap.into()),
@@ -204,6 +216,47 @@ impl Part<'_> {
         (uv.iter().map(|p| Point2::new(side * p.x, p.y)).collect(), side)
     }
 
+    /// The part embedded by its distances alone, in units of the surface; `None` if these do not span a plane.
+    fn embedded(&self, frame: &Frame<'_>) -> Result<Option<Vec<Point2<f64>>>, Cancelled> {
+        let (settings, progress) = (frame.settings, frame.progress);
+        let steps = Steps::new(self.mesh, settings, settings.seed, progress);
+        let distances = match steps.distances_of_all()? {
+            Some(distances) => distances,
+            None => geodesics::landmark_distances(self.mesh, &settings.geodesics, progress)?,
+        };
+        match steps.embed(&distances) {
+            Ok(chart) => Ok(Some(chart.uv)),
+            Err(EmbeddingError::Cancelled(cancelled)) => Err(cancelled),
+            Err(_) => Ok(None),
+        }
+    }
+
+    /// Moves the vertices of `start` that are not held to where a map has them, once that is moved, turned and scaled so that
+    /// it is as near as possible to what is held. Nothing where that is all at one point.
+    fn lay_on_held(&self, map: &[Point2<f64>], start: &mut [Point2<f64>]) {
+        let pairs = || start.iter().zip(map).zip(self.held).filter(|pair| *pair.1).map(|(pair, _)| pair);
+        let count = pairs().count() as f64;
+        let to = pairs().map(|(p, _)| p.coords).sum::<Vector2<f64>>() / count;
+        let from = pairs().map(|(_, q)| q.coords).sum::<Vector2<f64>>() / count;
+        let (mut cos, mut sin, mut square) = (0.0, 0.0, 0.0);
+        for (p, q) in pairs() {
+            let (p, q) = (p.coords - to, q.coords - from);
+            cos += q.dot(&p);
+            sin += q.perp(&p);
+            square += q.norm_squared();
+        }
+        let scale = f64::hypot(cos, sin) / square;
+        if !(scale.is_finite() && scale > 0.0) {
+            return;
+        }
+        let turn = Rotation2::new(f64::atan2(sin, cos)).into_inner() * scale;
+        for ((p, q), held) in start.iter_mut().zip(map).zip(self.held) {
+            if !held {
+                *p = Point2::from(turn * (q.coords - from) + to);
+            }
+        }
+    }
+
     /// The least stretch from a start in units of the surface, whose vertices may all move: without flips and without overlap.
     fn free(
         &self,
@@ -213,7 +266,7 @@ impl Part<'_> {
     ) -> Result<(Vec<Point2<f64>>, usize), Stop> {
         let (mesh, progress) = (self.mesh, frame.progress);
         let stop = |error| self.stop(error);
-        let settings = StretchSettings { solver: Solver::Newton, ..frame.settings.clone() };
+        let settings = StretchSettings { solver: Solver::Newton, ..frame.settings.stretch.clone() };
         let minimise = |start: &[Point2<f64>], keep_apart: Option<f64>| {
             let options = MinimiseOptions { keep_apart, ..MinimiseOptions::default() };
             stretch::minimise_stretch(mesh, rest, start, &settings, &options, progress).map_err(stop)

@@ -417,6 +417,25 @@ fn proportions_of_the_texture_count() {
     assert!(flat.only(&RelaxRules::default()).moved);
 }
 
+#[test]
+fn islands_that_start_anew_lose_what_no_relaxing_undoes() {
+    // A sheet rolled up to more than a turn, whose map somebody made from above: it lies on itself.
+    let roll = |x: f64, y: f64| [(7.0 * x).cos() / 7.0, (7.0 * x).sin() / 7.0, y];
+    let map = Mapped::grid(16, roll, |x, y| [0.3 + 0.1 * (7.0 * x).cos(), 0.3 + 0.1 * (7.0 * x).sin() + 0.05 * y]);
+    let anew = RelaxRules { start: RelaxStart::Anew, ..RelaxRules::default() };
+    let island = map.only(&anew);
+    assert!(island.moved && island.l2_after < 1.01, "{island:?}");
+    let (before, after) = (map.area_and_centroid(&map.uv), map.area_and_centroid(&map.relax(&anew).uv));
+    assert!((before.0 / after.0 - 1.0).abs() < 1e-4, "{before:?} {after:?}");
+    assert!((0..2).all(|k| (before.1[k] - after.1[k]).abs() < 1e-5), "{before:?} {after:?}");
+    // What lies well already has as little stretch from either start, and pins hold.
+    let [kept, other] = [RelaxRules::default(), anew].map(|rules| hill().only(&rules).l2_after);
+    assert!((kept - other).abs() < 1e-3, "{kept} {other}");
+    let pins = hill().pins(|p| p[0] == 0.0 || p[0] == 1.0);
+    let held = hill().only(&RelaxRules { pinned: Some(&pins), ..anew });
+    assert!(held.moved && held.l2_after < held.l2_before, "{held:?}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 40, ..ProptestConfig::default() })]
     #[test]
