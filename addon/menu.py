@@ -26,6 +26,7 @@ def draw_island_entries(self, _context):
     self.layout.operator("uv.ble_unwrap_pack")
     self.layout.operator("uv.ble_unwrap_align")
     self.layout.operator("uv.ble_unwrap_relax")
+    self.layout.operator("uv.ble_unwrap_anew")
 
 
 def register():

@@ -1,4 +1,4 @@
-"""Relaxing islands that are there, from objects to message: what moves, what is held, and what came of it."""
+"""Relaxing islands that are there, or unwrapping them anew, from objects to message."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -22,12 +22,14 @@ class Outcome:
 class RelaxTask:
     """Reads the meshes when made, then computes (`run` or `start`), then writes (`write`).
 
-    `settings` are `texture_size` and `correct_aspect`. Which islands move is for `IslandChoice` to say; pinned UVs
-    stay. Raises `mesh_arrays.MeshError`, `engine.EngineMissing`, `engine.EngineError`; whenever it does, nothing was
-    changed.
+    Islands are relaxed from how they are, or with `anew` unwrapped without regard to that, and go back to where they
+    were. `settings` are `texture_size` and `correct_aspect`. Which islands move is for `IslandChoice` to say; pinned
+    UVs stay. Raises `mesh_arrays.MeshError`, `engine.EngineMissing`, `engine.EngineError`; whenever it does, nothing
+    was changed.
     """
 
-    def __init__(self, objects, settings, *, threads=0, by_uv=False):
+    def __init__(self, objects, settings, *, anew=False, threads=0, by_uv=False):
+        self.anew = anew
         self.islands = IslandChoice(objects, lock_pinned=False, by_uv=by_uv)
         self.settings = {"texture_size": self.islands.texture_size(settings), "threads": threads}
 
@@ -44,6 +46,7 @@ class RelaxTask:
         vertices = uv_islands.welded(selection.positions, selection.corner_vertices, part)
         rules = {
             "pinned": islands.pinned_corners(),
+            "start": "anew" if self.anew else "as_they_are",
             "selected": np.append(islands.moves, False)[islands.island],
             "corner_triangles": selection.corner_triangles,
         }
@@ -64,19 +67,24 @@ class RelaxTask:
         report = relaxed.report
         left = told_of_left(report["islands"])
         if not report["relaxed"] and not report["kept"]:
-            raise MeshError(f"Nothing was relaxed: {'; '.join([*left, *self.islands.left])}")
+            raise MeshError(f"Nothing was {self._done}: {'; '.join([*left, *self.islands.left])}")
         if report["relaxed"]:
             self.islands.write(relaxed.uv)
-        return Outcome("; ".join([*told(report), *left, *self.islands.left]), self.islands.warnings)
+        return Outcome("; ".join([*told(report, self._done), *left, *self.islands.left]), self.islands.warnings)
+
+    @property
+    def _done(self):
+        """What was done to islands, in a word or two."""
+        return "unwrapped anew" if self.anew else "relaxed"
 
 
-def told(report):
+def told(report, done):
     """What was done with islands, in parts of a sentence."""
     parts = []
     if count := report["relaxed"]:
         moved = [island for island in report["islands"] if island["moved"]]
         before, after = (stretch(moved, name) for name in ("l2_before", "l2_after"))
-        parts.append(f"{counted(count, 'island')} relaxed, stretch {before} to {after}")
+        parts.append(f"{counted(count, 'island')} {done}, stretch {before} to {after}")
     if count := report["kept"]:
         parts.append(f"{counted(count, 'island')} had the least stretch already")
     return parts

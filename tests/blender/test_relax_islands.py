@@ -18,7 +18,7 @@ from scenes import (
 )
 from test_artist_state import pin, select_uv_faces
 
-relax = bpy.ops.uv.ble_unwrap_relax
+relax, anew = bpy.ops.uv.ble_unwrap_relax, bpy.ops.uv.ble_unwrap_anew
 
 
 def corner_vertices(obj):
@@ -251,6 +251,29 @@ def test_what_cannot_be_relaxed_is_said():
         relax()
 
 
+def test_islands_are_unwrapped_anew_with_the_seams_that_they_have(addon):
+    obj = hill()
+    second = halved(obj)
+    x, y = uvs(obj).T
+    crushed = np.column_stack([np.abs(x - 0.2), y])
+    set_uvs(obj, np.where(second[:, None], crushed, uvs(obj)))
+    before = uvs(obj).copy()
+    edit(obj, faces=[63])
+    assert anew() == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    moved = (uvs(obj) != before).any(axis=1)
+    assert moved[second].any() and not moved[~second].any()
+    assert (triangle_areas(obj, uvs(obj)) > 0).all()
+    np.testing.assert_allclose(np.mean(uvs(obj)[second], axis=0), np.mean(before[second], axis=0), atol=0.05)
+    select(obj)
+    work = addon("relax_task").RelaxTask([obj], {"texture_size": (64, 64), "correct_aspect": True}, anew=True)
+    assert "island" in work.write(work.run()).summary
+    pin(obj, np.flatnonzero(second))
+    with pytest.raises(RuntimeError, match=r"Nothing was unwrapped anew: 1 island .* all of it is pinned"):
+        edit(obj, faces=[63])
+        anew()
+
+
 def test_the_proportions_of_the_image_count(addon):
     obj = hill(bump=0.0)
     set_uvs(obj, 0.2 * plan(obj) * (1, 4))
@@ -264,4 +287,5 @@ def test_the_proportions_of_the_image_count(addon):
 def test_the_menu_has_an_entry(addon):
     functions = getattr(bpy.types.IMAGE_MT_uvs.draw, "_draw_funcs", [])
     assert sum(function is addon("menu").draw_island_entries for function in functions) == 1
-    assert bpy.ops.uv.ble_unwrap_relax.get_rna_type().name == "Relax Islands (BLE)"
+    assert relax.get_rna_type().name == "Relax Islands (BLE)"
+    assert anew.get_rna_type().name == "Re-unwrap Islands (BLE)"
