@@ -98,7 +98,8 @@ impl RelaxedMap {
 /// it was, which is no error but told in the report. Parts of an island that are joined at a vertex only are held there, and their overlaps
 /// with each other are seen from 1e-9 of the island on.
 ///
-/// Not guaranteed: that islands keep clear of each other, since their outlines change.
+/// Not guaranteed: that islands keep clear of each other, since their outlines change; nor that a quad stays convex, as long as its triangles are
+/// not turned over (``bent_quads`` of ``measure``).
 ///
 /// A few dozen sparse linear systems of 2n unknowns for an island of n vertices.
 ///

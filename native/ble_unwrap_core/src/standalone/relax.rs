@@ -175,7 +175,8 @@ pub struct Relaxed {
 /// - The result is the same for any number of threads.
 ///
 /// Not guaranteed: that an island keeps clear of others, since its outline changes; [`measure_layout`](super::measure_layout)
-/// finds where it does not, and [`repack`](super::repack()) gives each a place of its own.
+/// finds where it does not, and [`repack`](super::repack()) gives each a place of its own. Nor that a quad stays convex, as long as
+/// the triangles that it comes with, or is divided into, are not turned over; `measure_layout` counts such quads.
 ///
 /// A few dozen sparse linear systems for each island; about as long as `unwrap` minimises the stretch of charts as large.
 ///
@@ -408,7 +409,7 @@ impl<'a> Layout<'a> {
             Ok(found) => found,
             Err(Stop::Cancelled(cancelled)) => return Err(cancelled),
             Err(Stop::Left(reason)) => {
-                island.left = Some(reason);
+                island.left = Some(if pinned.is_empty() { reason.without_pins() } else { reason });
                 return Ok((island, Moves::new()));
             }
         };

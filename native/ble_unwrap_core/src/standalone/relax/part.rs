@@ -42,6 +42,9 @@ pub enum LeftAsItWas {
         /// The first such vertex.
         vertex: usize,
     },
+    /// None of its vertices is pinned, but its parts, which are joined at vertices only, are held there, and cannot be relaxed so.
+    #[error("its parts, which are joined at single vertices only, hold each other as they are")]
+    PartsHold,
     /// Its parts, which are joined at vertices only, would overlap each other.
     #[error("its parts, which are joined at single vertices only, would overlap each other")]
     PartsOverlap,
@@ -74,6 +77,14 @@ pub enum LeftAsItWas {
 }
 
 impl LeftAsItWas {
+    /// The reason why an island is left that was held, if it was held by its own parts and not by pins.
+    pub(super) fn without_pins(self) -> Self {
+        match self {
+            Self::AllPinned | Self::PinsTurnFacesOver | Self::PinsOverlap => Self::PartsHold,
+            other => other,
+        }
+    }
+
     /// The vertices of the input at which the reason is found, where it is found at single ones.
     #[must_use]
     pub fn vertices(&self) -> Vec<usize> {

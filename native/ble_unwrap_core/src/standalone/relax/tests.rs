@@ -273,6 +273,15 @@ fn parts_that_share_one_vertex_are_held_there() {
     let [(0, island)] = relaxed.islands[..] else { panic!("one island: {:?}", relaxed.islands) };
     assert!(island.moved && island.faces == 288, "{island:?}");
     assert_eq!(relaxed.uv[143 * 4 + 2], map.uv[143 * 4 + 2]);
+    // One triangle that hangs at all of its vertices, each of which is a corner of another, cannot move; nor can two such.
+    let both = Mapped {
+        positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.3, 1.0, 0.0]],
+        corners: vec![0, 1, 2, 0, 1, 2],
+        offsets: vec![0, 3, 6],
+        uv: [[0.1f32, 0.1], [0.5, 0.1], [0.3, 0.2]].repeat(2),
+    };
+    let left = both.only(&RelaxRules::default()).left;
+    assert!(matches!(left, Some(LeftAsItWas::PartsHold | LeftAsItWas::PartsOverlap)), "{left:?}");
     // An island that touches itself in this way is left: a ring of eight quads, one of which hangs at a vertex.
     let mut ring = Mapped::grid(3, |x, y| [x, y, 0.0], shrunk);
     let hole = 4;
