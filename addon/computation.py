@@ -113,6 +113,38 @@ def _packer(points, triangles, island, settings, rules):
     return call
 
 
+@dataclass
+class Relaxed:
+    """One UV per corner, and the native report."""
+
+    uv: np.ndarray  # (c, 2) float32
+    report: dict
+
+
+def relax(mesh, uv, settings, **rules):
+    """Relaxes islands at once. Raises `engine.EngineMissing`, `engine.EngineError`.
+
+    `mesh` are positions, vertices of corners and offsets of faces; `rules` are what the native `relax` takes beside
+    its settings, such as `pinned`.
+    """
+    return engine.call(_relaxer(mesh, uv, settings, rules))
+
+
+def submit_relax(mesh, uv, settings, **rules):
+    """As `relax`, on another thread: a `Job`."""
+    return ThreadJob(_relaxer(mesh, uv, settings, rules))
+
+
+def _relaxer(mesh, uv, settings, rules):
+    settings = engine.native_settings(settings)
+
+    def call(module, job=None):
+        relaxed = module.relax(*mesh, uv, **rules, **settings, job=job)
+        return Relaxed(np.asarray(relaxed.uv, np.float32), dict(relaxed.report))
+
+    return call
+
+
 class Job:
     """A computation on the native module's own thread."""
 

@@ -75,10 +75,14 @@ class IslandChoice:
         found[self.island[is_meant & (self.island >= 0)]] = True
         return found
 
+    def pinned_corners(self):
+        """The corners whose UV is pinned, (c,) bool."""
+        pairs = zip(self.objects, self.maps, strict=True)
+        return np.concatenate([uv_maps.pinned_corners(obj.data, name) for obj, name in pairs])
+
     def _pinned(self):
         """Which islands have a pinned UV."""
-        pairs = zip(self.objects, self.maps, strict=True)
-        pinned = np.concatenate([uv_maps.pinned_corners(obj.data, name) for obj, name in pairs])
+        pinned = self.pinned_corners()
         found = np.zeros(self.count, bool)
         found[self.corner_island[pinned & (self.corner_island >= 0)]] = True
         return found

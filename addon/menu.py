@@ -25,6 +25,8 @@ def draw_island_entries(self, _context):
     self.layout.operator_context = "INVOKE_DEFAULT"
     self.layout.operator("uv.ble_unwrap_pack")
     self.layout.operator("uv.ble_unwrap_align")
+    self.layout.operator("uv.ble_unwrap_relax")
+    self.layout.operator("uv.ble_unwrap_anew")
 
 
 def register():

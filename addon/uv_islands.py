@@ -29,9 +29,7 @@ def islands(positions, corner_vertices, face_offsets, uv, part_of_face):
     of_corners = np.full(len(face_of_corner), -1, np.int64)
     if not len(corners):
         return of_corners, found
-    part = np.zeros((len(positions), 1), np.float32)
-    part[corner_vertices] = part_of_face[face_of_corner, None]
-    vertex_place, _ = _equal_rows(_bits(np.concatenate([part, positions], axis=1)))
+    vertex_place = _vertex_places(positions, corner_vertices, part_of_face[face_of_corner])
     in_map = _bits(uv[corners]).astype(np.uint64)
     in_map = in_map[:, 0] << np.uint64(32) | in_map[:, 1]
     on_surface = vertex_place[corner_vertices[corners]].astype(np.uint64)
@@ -48,6 +46,20 @@ def islands(positions, corner_vertices, face_offsets, uv, part_of_face):
     rank[np.argsort(lowest)] = np.arange(len(lowest), dtype=np.int32)
     found[faces] = rank[number.reshape(-1)]
     return of_corners, found
+
+
+def welded(positions, corner_vertices, part_of_corner):
+    """The vertex of each corner, (c,) int32: of all vertices of its mesh that are at one place, the lowest."""
+    place = _vertex_places(positions, corner_vertices, part_of_corner)
+    _, lowest = np.unique(place, return_index=True)
+    return lowest[place[corner_vertices]].astype(np.int32)
+
+
+def _vertex_places(positions, corner_vertices, part_of_corner):
+    """A number for each vertex, (n,), the same for those of one mesh that are at one place."""
+    part = np.zeros((len(positions), 1), np.float32)
+    part[corner_vertices] = part_of_corner[:, None]
+    return _equal_rows(_bits(np.concatenate([part, positions], axis=1)))[0]
 
 
 def _bits(numbers):

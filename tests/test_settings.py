@@ -112,6 +112,7 @@ FUNCTIONS = {
     "geodesic_distances": lambda **settings: native.geodesic_distances(None, None, None, None, **settings),
     "graph_distances": lambda **settings: native.graph_distances(None, **settings),
     "measure": lambda **settings: native.measure(None, None, None, None, **settings),
+    "relax": lambda **settings: native.relax(None, None, None, None, **settings),
     "pack": lambda **settings: native.pack(None, None, None, **settings),
 }
 OWN_ARGUMENTS = {"embed": {"initial"}}  # which also takes coordinates there

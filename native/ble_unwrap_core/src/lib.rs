@@ -8,7 +8,7 @@
 //! |---|---|
 //! | this module | unwrapping meshes and point clouds; a [`Progress`] watches and cancels it |
 //! | [`settings`] | every parameter, its range, and how a host can present it |
-//! | [`standalone`] | single steps: computing distances, flattening a patch, measuring or certifying a layout, packing charts |
+//! | [`standalone`] | single steps: computing distances, flattening a patch, measuring or certifying a layout, relaxing islands, packing charts |
 //! | [`embedding`] | the paper's method for points of any kind |
 //! | [`memory`] | hosts with an allocator of their own |
 //!

@@ -3,7 +3,9 @@
 use std::fmt::Display;
 
 use ble_unwrap_core::embedding::EmbeddingError;
-use ble_unwrap_core::standalone::{CloudDistancesError, DistancesError, FlattenError, LayoutError, RepackError};
+use ble_unwrap_core::standalone::{
+    CloudDistancesError, DistancesError, FlattenError, LayoutError, RelaxError, RepackError,
+};
 use ble_unwrap_core::{self as core, Certificate, CloudError, ErrorKind, UnwrapError};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyMemoryError};
@@ -168,6 +170,7 @@ raised!(
     EmbeddingError,
     FlattenError,
     LayoutError,
+    RelaxError,
     RepackError
 );
 

@@ -13,6 +13,7 @@ mod measure;
 mod owned_array;
 mod pack;
 mod place;
+mod relax;
 mod report;
 mod settings;
 mod unwrap;
@@ -44,6 +45,8 @@ mod native {
     use crate::pack::{PackedCharts, pack};
     #[pymodule_export]
     use crate::place::place;
+    #[pymodule_export]
+    use crate::relax::{RelaxedMap, relax};
     #[pymodule_export]
     use crate::settings::default_settings;
     #[pymodule_export]

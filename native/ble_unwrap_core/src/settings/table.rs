@@ -84,12 +84,13 @@ pub enum Function {
     GeodesicDistances,
     GraphDistances,
     Measure,
+    Relax,
     Pack,
 }
 
 impl Function {
     /// All functions.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Unwrap,
         Self::Analyse,
         Self::UnwrapPoints,
@@ -100,6 +101,7 @@ impl Function {
         Self::GeodesicDistances,
         Self::GraphDistances,
         Self::Measure,
+        Self::Relax,
         Self::Pack,
     ];
 
@@ -117,6 +119,7 @@ impl Function {
             Self::GeodesicDistances => "geodesic_distances",
             Self::GraphDistances => "graph_distances",
             Self::Measure => "measure",
+            Self::Relax => "relax",
             Self::Pack => "pack",
         }
     }
@@ -147,8 +150,12 @@ pub enum Group {
     Start,
     /// How one patch of a surface becomes flat.
     Flattening,
-    /// The texture that the result is for.
-    Texture,
+    /// How long the stretch of a chart is minimised.
+    Stretch,
+    /// The size of the texture that the result is for.
+    Size,
+    /// How far apart charts are in the texture.
+    Margin,
     /// The tiles that the texture has. Clouds have one.
     Tiles,
     /// How charts are placed in the texture.
@@ -159,7 +166,7 @@ pub enum Group {
 
 impl Group {
     /// All groups.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 16] = [
         Self::Charts,
         Self::Limit,
         Self::Weld,
@@ -170,7 +177,9 @@ impl Group {
         Self::Fit,
         Self::Start,
         Self::Flattening,
-        Self::Texture,
+        Self::Stretch,
+        Self::Size,
+        Self::Margin,
         Self::Tiles,
         Self::Packing,
         Self::Density,
@@ -190,7 +199,9 @@ impl Group {
             Self::Fit => "fit",
             Self::Start => "start",
             Self::Flattening => "flattening",
-            Self::Texture => "texture",
+            Self::Stretch => "stretch",
+            Self::Size => "size",
+            Self::Margin => "margin",
             Self::Tiles => "tiles",
             Self::Packing => "packing",
             Self::Density => "density",
@@ -200,11 +211,11 @@ impl Group {
     /// Whether a function takes the settings of the group. If it does not, giving it one is an error.
     #[must_use]
     pub fn concerns(self, function: Function) -> bool {
-        use Function::{Analyse, Embed, Flatten, GeodesicDistances, Measure, Pack, Place, Unwrap, UnwrapPoints};
+        use Function::{Analyse, Embed, Flatten, GeodesicDistances, Measure, Pack, Place, Relax, Unwrap, UnwrapPoints};
         let others: &[Function] = match self {
             Self::Charts => &[],
             Self::Limit => &[UnwrapPoints],
-            Self::Weld => &[Analyse, Flatten, Measure],
+            Self::Weld => &[Analyse, Flatten, Measure, Relax],
             Self::Cut => &[Analyse],
             Self::Geodesics => &[GeodesicDistances, Flatten],
             Self::Landmarks => &[Flatten, UnwrapPoints],
@@ -212,7 +223,9 @@ impl Group {
             Self::Fit => &[Embed, Flatten, UnwrapPoints],
             Self::Start => &[Flatten, UnwrapPoints],
             Self::Flattening => &[Flatten],
-            Self::Texture => &[Measure, Pack, UnwrapPoints],
+            Self::Stretch => &[Flatten, Relax],
+            Self::Size => &[Measure, Pack, Relax, UnwrapPoints],
+            Self::Margin => &[Measure, Pack, UnwrapPoints],
             Self::Tiles => &[Measure, Pack],
             Self::Packing => &[Pack, UnwrapPoints],
             Self::Density => &[Pack],
@@ -456,15 +469,15 @@ pub static TABLE: &[Setting] = &[
         "Where the embedding starts from."),
     row("stretch_solver", "Stretch Solver", Group::Flattening, Kind::Choice(|s| &mut s.stretch.solver), "",
         "How the stretch of a chart is minimised."),
-    row("stretch_iterations", "Iterations", Group::Flattening, Kind::Whole(|s| &mut s.stretch.max_iterations, [1, 100_000]), "iterations",
+    row("stretch_iterations", "Iterations", Group::Stretch, Kind::Whole(|s| &mut s.stretch.max_iterations, [1, 100_000]), "iterations",
         "Most iterations of the stretch solver."),
-    row("margin", "Margin", Group::Texture, Kind::Real(|s| &mut s.packing.margin_texels, Interval::closed(0.0, 1024.0)), "texels",
+    row("margin", "Margin", Group::Margin, Kind::Real(|s| &mut s.packing.margin_texels, Interval::closed(0.0, 1024.0)), "texels",
         "Least distance between two charts, in texels, the pixels of the texture; half of it is kept to the border."),
-    row("texture_size", "Texture Size", Group::Texture,
+    row("texture_size", "Texture Size", Group::Size,
         Kind::Size(|s| [&mut s.packing.width, &mut s.packing.height], [1, PackSettings::LARGEST_SIZE]), "texels",
         "Width and height, in texels, of the texture that the UVs are meant for: its proportions and, for the margin, its \
          resolution."),
-    row("mip_levels", "Mip Levels", Group::Texture, Kind::Whole(|s| &mut s.packing.mip_levels, [0, PackSettings::MOST_MIP_LEVELS]), "levels",
+    row("mip_levels", "Mip Levels", Group::Margin, Kind::Whole(|s| &mut s.packing.mip_levels, [0, PackSettings::MOST_MIP_LEVELS]), "levels",
         "On how many mip levels of the texture, besides itself, bilinear filtering mixes no two charts: the margin is raised to 2.83 texels of the last one. \
          0 leaves it as it is."),
     row("rotation", "Rotation", Group::Packing, Kind::Choice(|s| &mut s.packing.rotation), "",

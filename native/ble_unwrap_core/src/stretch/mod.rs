@@ -9,7 +9,7 @@
 //! if no face is flipped and the boundary loops are simple ([`boundary_is_simple`]).
 //!
 //! The ways in: [`make_injective`] removes flips, [`minimise_stretch`] lowers the stretch without making
-//! any, [`bulge()`] tells where to cut before all that, [`tutte_embedding`] makes an injective map from nothing, [`first_flip`] and [`boundary_is_simple`] check exactly.
+//! any, [`minimise_pinned`] does so while some vertices stay, [`bulge()`] tells where to cut before all that, [`tutte_embedding`] makes an injective map from nothing, [`first_flip`] and [`boundary_is_simple`] check exactly.
 //!
 //! Papers: Sander et al. 2001 (stretch, line searches), Smith and Schaefer 2015 (step limits, boundary
 //! barrier), Smith et al. 2019 (closed-form Hessians), Garanzha et al. 2021 (flips), Tutte 1963 and Floater
@@ -34,6 +34,7 @@ mod other_halves;
 mod overlap;
 mod part_boundary;
 mod peaks;
+mod pinned;
 mod rectangle;
 mod sides;
 mod stitch;
@@ -55,6 +56,7 @@ pub(crate) use measure::{l2_of_positions, l2_stretch, l2_unsigned, linf_stretch,
 pub(crate) use overlap::{boundary_is_simple, first_flip};
 pub(crate) use part_boundary::{boundary_is_tangled, part_boundary};
 pub(crate) use peaks::lower_peaks;
+pub(crate) use pinned::{PinnedMap, minimise_pinned};
 pub(crate) use rectangle::rectangle;
 pub(crate) use stitch::Stitcher;
 pub(crate) use straighten_sides::{aligned_length, straighten_sides};

@@ -49,6 +49,11 @@ const WORST_STEPS: usize = 12;
 /// Mending the worst triangles ends when a step gains less than this share.
 const WORST_TOLERANCE: f64 = 1e-2;
 
+/// A map with pinned vertices is minimised in so many rounds at most, each at the scale that was best after the one before.
+const PINNED_ROUNDS: usize = 8;
+/// Such a map has its scale when that changes by less than this share.
+const SAME_SCALE: f64 = 1e-2;
+
 /// Drawing edges to the axes goes on to the next weight when a step gains less than this share.
 const ALIGN_TOLERANCE: f64 = 1e-3;
 
@@ -224,6 +229,53 @@ pub(super) fn relax_aligned(
     Ok(Some(descent.uv))
 }
 
+/// Lowers the energy of a map without flips while the pinned vertices stay. The energy is that of the map times `scale` first, and
+/// then at whatever scale is best for it. With `keep_apart`, whose start must have a simple boundary, that stays so. The map, at
+/// the scale of the start, and how many steps were made: no more than the settings allow.
+#[expect(clippy::too_many_arguments, reason = "each is needed, and there is one caller")]
+pub(super) fn relax_pinned(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    pinned: &[bool],
+    start: &[Point2<f64>],
+    scale: f64,
+    keep_apart: Option<f64>,
+    settings: &StretchSettings,
+    progress: &Progress,
+) -> Result<(Vec<Point2<f64>>, usize), StretchError> {
+    let energy = StretchEnergy::new(settings.dirichlet_weight);
+    let warm = StretchEnergy::new(settings.dirichlet_weight.max(0.5));
+    let tolerance = if keep_apart.is_some() { APART_TOLERANCE } else { 1.0 } * settings.tolerance;
+    let none = OtherHalves::default();
+    let mut descent = Descent::new(mesh, rest, &none, start.to_vec(), pinned.to_vec(), keep_apart)?;
+    let (mut factor, mut scale, mut steps) = (scale, 1.0, 0);
+    for round in 0..PINNED_ROUNDS {
+        let Some(scaled) = scaled(mesh, &descent.uv, factor, keep_apart.is_some()) else { break };
+        descent.uv = scaled;
+        scale *= factor;
+        while steps < settings.max_iterations {
+            progress.check()?;
+            let warm_up = round == 0 && steps < WARM_UP && descent.value(&energy, &descent.uv) > WARM_UP_ABOVE;
+            let Some((before, after)) = descent.step(mesh, if warm_up { &warm } else { &energy }) else { break };
+            steps += 1;
+            if !warm_up && before - after <= tolerance * after {
+                break;
+            }
+        }
+        // The sums of the energy's first part, which is least over all scales at this one.
+        let sums = descent.system.faces.stretch_sums(&descent.uv);
+        factor = (sums.stretch / sums.area).powf(0.25);
+        if steps >= settings.max_iterations || !factor.is_finite() || (factor - 1.0).abs() < SAME_SCALE {
+            break;
+        }
+    }
+    let mut uv: Vec<Point2<f64>> = descent.uv.iter().map(|p| p / scale).collect();
+    put_back(start, pinned, &mut uv);
+    // Rounding alone can turn a triangle over here, or make the boundary touch itself.
+    let is_sound = first_flip(mesh, &uv).is_none() && (keep_apart.is_none() || boundary_is_simple(mesh, &uv));
+    Ok(if is_sound { (uv, steps) } else { (start.to_vec(), 0) })
+}
+
 /// Everything one Newton step works on.
 struct Descent<'a> {
     system: ChartSystem<'a>,
@@ -320,12 +372,25 @@ impl<'a> Descent<'a> {
 /// Scales all of `uv`, unless rounding would flip a triangle or, where that matters, make the boundary
 /// touch itself.
 pub(super) fn rescale(mesh: &TriMesh, uv: &mut Vec<Point2<f64>>, scale: f64, keep_boundary_simple: bool) {
+    if let Some(scaled) = scaled(mesh, uv, scale, keep_boundary_simple) {
+        *uv = scaled;
+    }
+}
+
+/// The map scaled; `None` where it cannot be, as [`rescale`] says.
+fn scaled(mesh: &TriMesh, uv: &[Point2<f64>], scale: f64, keep_boundary_simple: bool) -> Option<Vec<Point2<f64>>> {
     if !(scale.is_finite() && scale > 0.0) {
-        return;
+        return None;
     }
     let scaled: Vec<Point2<f64>> = uv.iter().map(|p| p * scale).collect();
-    if first_flip(mesh, &scaled).is_none() && (!keep_boundary_simple || boundary_is_simple(mesh, &scaled)) {
-        *uv = scaled;
+    let is_sound = first_flip(mesh, &scaled).is_none() && (!keep_boundary_simple || boundary_is_simple(mesh, &scaled));
+    is_sound.then_some(scaled)
+}
+
+/// Gives the pinned vertices their coordinates of the start, to the bit.
+pub(super) fn put_back(start: &[Point2<f64>], pinned: &[bool], uv: &mut [Point2<f64>]) {
+    for (v, _) in pinned.iter().enumerate().filter(|p| *p.1) {
+        uv[v] = start[v];
     }
 }
 
@@ -409,6 +474,43 @@ mod tests {
                 }
             }
             assert!(steps > 3 && last < 1.1, "{steps} {last}");
+        }
+    }
+
+    #[test]
+    fn with_pins_the_energy_falls_in_every_step_along_a_direction_that_leaves_them() {
+        let mesh = hemisphere(10);
+        let rest = RestTriangle::of_mesh(&mesh);
+        let start = tutte(&mesh, &rest);
+        let pinned: Vec<bool> = mesh.positions().iter().map(|p| p.x > 0.9 || p.z > 0.95).collect();
+        let held = || pinned.iter().enumerate().filter(|p| *p.1).map(|(v, _)| v);
+        assert!(held().count() > 5);
+        let (energy, none) = (StretchEnergy::new(0.05), OtherHalves::default());
+        for keep in [None, Some(BOUNDARY_REACH)] {
+            let mut descent = Descent::new(&mesh, &rest, &none, start.clone(), pinned.clone(), keep).expect("analysis");
+            // The slope that is promised is the derivative along the direction.
+            descent.system.assemble(&energy, &start);
+            let slope = descent.system.solve_pinned(&pinned, &mut descent.direction).expect("a way down");
+            let along = |t: f64| {
+                let mut moved = start.clone();
+                advance(&start, &descent.direction, t, &mut moved);
+                descent.system.faces.value(&energy, &moved)
+            };
+            let difference = (along(1e-6) - along(-1e-6)) / 2e-6;
+            assert!(slope < 0.0 && (difference / slope - 1.0).abs() < 1e-5, "{difference} {slope}");
+            let mut last = descent.value(&energy, &descent.uv);
+            let mut steps = 0;
+            while let Some((before, after)) = descent.step(&mesh, &energy) {
+                assert!(before == last && after < before, "{before} {last} {after}");
+                assert_eq!(first_flip(&mesh, &descent.uv), None);
+                assert!(held().all(|v| descent.direction[2 * v..2 * v + 2] == [0.0, 0.0] && descent.uv[v] == start[v]));
+                last = after;
+                steps += 1;
+                if steps == 40 {
+                    break;
+                }
+            }
+            assert!(steps > 3, "{steps}");
         }
     }
 

@@ -21,6 +21,7 @@ __all__ = [
     "OutOfMemoryError",
     "PackedCharts",
     "PointAtlas",
+    "RelaxedMap",
     "UnprovenError",
     "__version__",
     "analyse",
@@ -32,6 +33,7 @@ __all__ = [
     "measure",
     "pack",
     "place",
+    "relax",
     "submit_unwrap",
     "submit_unwrap_points",
     "unwrap",
@@ -152,15 +154,21 @@ class _FlatteningGroup(TypedDict, total=False):
     """Charts of at most so many vertices are embedded with all their vertices together, as in the paper, at a cost of the square of their number; larger ones by their landmarks."""
     stretch_solver: Literal["newton", "line_search"]
     """How the stretch of a chart is minimised. "newton": Projected Newton steps, which are fast. "line_search": One vertex at a time along random directions, as in the paper."""
+
+@type_check_only
+class _StretchGroup(TypedDict, total=False):
     stretch_iterations: int
     """Most iterations of the stretch solver."""
 
 @type_check_only
-class _TextureGroup(TypedDict, total=False):
-    margin: float
-    """Least distance between two charts, in texels, the pixels of the texture; half of it is kept to the border."""
+class _SizeGroup(TypedDict, total=False):
     texture_size: int | Sequence[int]
     """Width and height, in texels, of the texture that the UVs are meant for: its proportions and, for the margin, its resolution."""
+
+@type_check_only
+class _MarginGroup(TypedDict, total=False):
+    margin: float
+    """Least distance between two charts, in texels, the pixels of the texture; half of it is kept to the border."""
     mip_levels: int
     """On how many mip levels of the texture, besides itself, bilinear filtering mixes no two charts: the margin is raised to 2.83 texels of the last one. 0 leaves it as it is."""
 
@@ -198,7 +206,9 @@ class _UnwrapSettings(
     _FitGroup,
     _StartGroup,
     _FlatteningGroup,
-    _TextureGroup,
+    _StretchGroup,
+    _SizeGroup,
+    _MarginGroup,
     _TilesGroup,
     _PackingGroup,
     _DensityGroup,
@@ -216,7 +226,8 @@ class _UnwrapPointsSettings(
     _ModelGroup,
     _FitGroup,
     _StartGroup,
-    _TextureGroup,
+    _SizeGroup,
+    _MarginGroup,
     _PackingGroup,
     total=False,
 ): ...
@@ -234,6 +245,7 @@ class _FlattenSettings(
     _FitGroup,
     _StartGroup,
     _FlatteningGroup,
+    _StretchGroup,
     total=False,
 ): ...
 
@@ -250,10 +262,21 @@ class _GeodesicDistancesSettings(_CallSettings, _GeodesicsGroup, total=False): .
 class _GraphDistancesSettings(_CallSettings, total=False): ...
 
 @type_check_only
-class _MeasureSettings(_CallSettings, _WeldGroup, _TextureGroup, _TilesGroup, total=False): ...
+class _MeasureSettings(_CallSettings, _WeldGroup, _SizeGroup, _MarginGroup, _TilesGroup, total=False): ...
 
 @type_check_only
-class _PackSettings(_CallSettings, _TextureGroup, _TilesGroup, _PackingGroup, _DensityGroup, total=False): ...
+class _RelaxSettings(_CallSettings, _WeldGroup, _StretchGroup, _SizeGroup, total=False): ...
+
+@type_check_only
+class _PackSettings(
+    _CallSettings,
+    _SizeGroup,
+    _MarginGroup,
+    _TilesGroup,
+    _PackingGroup,
+    _DensityGroup,
+    total=False,
+): ...
 
 # end of what `make settings` makes
 
@@ -335,6 +358,17 @@ class PointAtlas:
     def uv(self) -> Array: ...
     @property
     def chart(self) -> Array: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
+
+@final
+class RelaxedMap:
+    def __new__(cls, uv: Array, island: Array, report: dict[str, Any], /) -> RelaxedMap: ...
+    def __reduce__(self) -> tuple[type[RelaxedMap], tuple[Array, Array, dict[str, Any]]]: ...
+    @property
+    def uv(self) -> Array: ...
+    @property
+    def island(self) -> Array: ...
     @property
     def report(self) -> dict[str, Any]: ...
 
@@ -483,4 +517,17 @@ def place(
     job: Job | None = None,
     **settings: Unpack[_PlaceSettings],
 ) -> Array: ...
+def relax(
+    positions: Buffer,
+    corner_vertices: Buffer,
+    face_offsets: Buffer,
+    uv: Buffer,
+    *,
+    pinned: Buffer | None = None,
+    selected: Buffer | None = None,
+    start: Literal["as_they_are", "anew"] | None = "as_they_are",
+    corner_triangles: Buffer | None = None,
+    job: Job | None = None,
+    **settings: Unpack[_RelaxSettings],
+) -> RelaxedMap: ...
 def default_settings(preset: Literal["default", "paper", "iso_charts"] = "default") -> dict[str, Any]: ...
