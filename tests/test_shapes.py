@@ -150,10 +150,7 @@ def lie_of(layout, corners):
 # Boxes ----------------------------------------------------------------------------------------------------------------
 
 
-@cases(
-    "box",
-    short={"the ends of the net hang on different sides of its strip": ["1", "2", "2, triangles", "3, triangles"]},
-)
+@cases("box")
 def test_a_box_is_a_cross_a_t_or_six_rectangles(name, number, kind):
     layout, report = unwrapped(name, number, kind)
     assert report["charts"] in (1, 6) and layout.aligned() > 0.999 and report["l2"] < 1.0001
@@ -200,7 +197,7 @@ def test_the_front_and_the_back_of_a_frame_are_whole(name, number, kind):
             "crate 2*",
             "crate 3*",
         ],
-        "an end is bent to hang on by two edges at once": ["bracket 1", "bracket 3", "bracket 3, turned"],
+        "an end is bent to hang on by two edges at once": ["bracket 3, turned"],
     },
 )
 def test_what_is_made_of_planes_is_not_stretched(name, number, kind):
@@ -213,7 +210,7 @@ def test_what_is_made_of_planes_is_not_stretched(name, number, kind):
     "bracket",
     short={
         "rims and sunk panels are flattened together and lie aslant": ["crate 3*"],
-        "an end is bent to hang on by two edges at once, and leans": ["bracket 1", "bracket 3", "bracket 3, turned"],
+        "an end hangs on by two edges at once, and leans": ["bracket 3", "bracket 3, turned"],
     },
 )
 def test_planes_at_right_angles_lie_at_right_angles(name, number, kind):
@@ -531,7 +528,7 @@ def test_no_quad_is_bent(name, number):
     kinds=(1,),
     short={
         "a cap hangs on, or it is apart": ["barrel 1*"],
-        "in one piece or in two": ["bracket 3*"],
+        "in one piece or in two": ["bracket 1, triangles", "bracket 3*"],
         "flattened by planes, or rims and panels together": ["crate 3*"],
         "strips are cut across at other places": ["cable 3*", "belt 2*", "belt 3*"],
         "cut along other lines": ["torus 1*", "ball 1*", "rock 3*"],
