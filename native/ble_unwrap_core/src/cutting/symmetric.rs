@@ -15,7 +15,7 @@ use crate::settings::{LimitOver, Moves, Settings, Symmetry};
 
 use super::attempt;
 use super::copied::copied;
-use super::cost::Price;
+use super::cost::{self, Price};
 use super::history::{History, MoveKind};
 use super::merged::Merged;
 use super::moves::join::{Join, Which};
@@ -135,12 +135,17 @@ fn by_halves(
         };
         charts.push(image);
     }
+    // Joined, the halves of a ball would be an hourglass; apart they are two discs.
+    let are_two_discs = charts.len() == 2 && mesh::measure::is_ball(mesh) && !cost::may_bend(settings.stretch_price);
+    rungs.take(Rung::Mirrored);
     let mut cutting = Cutting::new(mesh, polygon, charts);
+    if are_two_discs {
+        return Ok(Some((cutting.into_charts(), rungs)));
+    }
     let zip = Zip { limit: settings.stretch_limit };
     let moves = [&Join { which: Which::EVERY, alone: MOST_ALONE } as &dyn Move, &PartialJoin::MostSeen, &zip];
     let moves = moves.map(|inner| InPlane { inner, mirror, embeds: !is_large });
     let moves: Vec<&dyn Move> = moves.iter().map(|made| made as &dyn Move).collect();
-    rungs.take(Rung::Mirrored);
     search(&mut cutting, &mut History::default(), &moves, settings, &mut rungs, run)?;
     Ok(Some((cutting.into_charts(), rungs)))
 }
