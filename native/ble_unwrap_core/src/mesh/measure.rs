@@ -86,7 +86,8 @@ pub(crate) fn is_ball(mesh: &TriMesh) -> bool {
         let share = (p - middle).norm() / radius;
         share >= least && share <= 1.0 + ROUND
     };
-    mesh.halfedges().all(|h| !mesh.is_boundary(h))
+    total > 0.0
+        && mesh.halfedges().all(|h| !mesh.is_boundary(h))
         && mesh.positions().iter().all(|p| is_at(p.coords, 1.0 - ROUND))
         && middles().all(|p| is_at(p, LEAST_ROUND))
 }
