@@ -253,8 +253,7 @@ impl<'a> Attempt<'a> {
         rungs.take(Rung::Dart);
         let is_wanted = self.settings.symmetry == Symmetry::Auto && self.patch().faces.len() <= MOST_FACES_OF_NETS;
         if is_wanted && !is_mirrored(&chart) {
-            let nets = net::along_edges(self.patch()).into_iter();
-            let mut others = nets.filter_map(|net| unfolded(net, &mut Rungs::default()));
+            let mut others = net::along_edges(self.patch()).filter_map(|net| unfolded(net, &mut Rungs::default()));
             chart = others.find(is_mirrored).unwrap_or(chart);
         }
         Some(chart)

@@ -51,33 +51,23 @@ pub(crate) fn net(patch: &Patch) -> Option<Patch> {
     None
 }
 
-/// The nets of a patch whose cuts run along its edges from corner to corner, or to its boundary, and cost little more than the least, cheapest first. Empty
+/// The nets of a patch whose cuts run along its edges from corner to corner, or to its boundary, and cost little more than the least, cheapest first. None
 /// where its corners are not joined so, or guides run inside it.
-pub(crate) fn along_edges(patch: &Patch) -> Vec<Patch> {
-    let Some(corners) = stretch::corners(&patch.mesh, MOST_CORNERS).filter(|_| !is_guided(patch)) else {
-        return Vec::new();
-    };
-    let lines = lines(patch, &corners);
-    if lines.len() > MOST_LINES {
-        return Vec::new();
-    }
+pub(crate) fn along_edges(patch: &Patch) -> impl Iterator<Item = Patch> + '_ {
+    let corners = stretch::corners(&patch.mesh, MOST_CORNERS).filter(|_| !is_guided(patch));
+    let lines = corners.as_deref().map_or_else(Vec::new, |corners| lines(patch, corners));
     let is_open = patch.mesh.halfedges().any(|h| patch.mesh.is_boundary(h));
-    let mut trees = Trees {
-        lines: &lines,
-        nodes: corners.len() + usize::from(is_open),
-        steps: 0,
-        most: f64::INFINITY,
-        found: Vec::new(),
-    };
-    // The first tree that is found is the cheapest.
-    trees.grow(0, &mut Vec::new(), 0.0);
+    let nodes = corners.map_or(0, |corners| corners.len()) + usize::from(is_open);
+    let mut trees = Trees { lines: &lines, nodes, steps: 0, most: f64::INFINITY, found: Vec::new() };
+    if !lines.is_empty() && lines.len() <= MOST_LINES {
+        trees.grow(0, &mut Vec::new(), 0.0);
+    }
     let mut found = trees.found;
     found.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
-    let cut = |tree: &(f64, Vec<usize>)| {
-        let edges: Vec<HalfedgeId> = tree.1.iter().flat_map(|&line| lines[line].edges.iter().copied()).collect();
+    found.into_iter().take(MOST_NETS).map(move |(_, tree)| {
+        let edges: Vec<HalfedgeId> = tree.iter().flat_map(|&line| lines[line].edges.iter().copied()).collect();
         patch.cut(&edges)
-    };
-    found.iter().take(MOST_NETS).map(cut).collect()
+    })
 }
 
 /// A line of edges over which the surface bends.
@@ -226,7 +216,7 @@ mod tests {
         let mut trees = Trees { lines: &lines, nodes: 8, steps: 0, most: f64::INFINITY, found: Vec::new() };
         trees.grow(0, &mut Vec::new(), 0.0);
         assert_eq!(trees.found.len(), 384, "Kirchhoff's number of spanning trees of a cube");
-        let nets = along_edges(&quads);
+        let nets: Vec<Patch> = along_edges(&quads).collect();
         assert_eq!(nets.len(), MOST_NETS);
         let unfolded = |net: &Patch| crate::flattening::isometric(net, &mut crate::flattening::Rungs::default());
         let is_mirrored = |net: &Patch| unfolded(net).is_some_and(|flat| has_mirrored_outline(&net.mesh, &flat.uv));
@@ -239,13 +229,13 @@ mod tests {
         let cube = test_surfaces::cubes([2, 2, 2], |_| true);
         let long = whole(moved(&cube, |p| Point3::new(p.x, 2.0 * p.y, 5.0 * p.z)));
         let cost = |net: &Patch| net.mesh.boundary_length();
-        let nets = along_edges(&long);
+        let nets: Vec<Patch> = along_edges(&long).collect();
         assert!(nets.iter().all(|net| cost(net) <= SYMMETRIC * cost(&nets[0]) + 1e-9), "all edges bend alike");
         let open = test_surfaces::cubes([1, 1, 1], |_| true);
         let walls: Vec<_> = open.faces().filter(|f| open.triangle_positions(*f).iter().any(|p| p.z < 1.0)).collect();
         let polygon: Vec<u32> = (0..open.face_count() as u32).collect();
         let open = Patch::of_surface(&open, &polygon, walls);
-        assert!(!along_edges(&open).is_empty(), "a box without a lid is cut from its corners up");
+        assert!(along_edges(&open).next().is_some(), "a box without a lid is cut from its corners up");
     }
 
     #[test]
