@@ -62,7 +62,7 @@ pub(super) fn triangulate(
             outline.extend(corners.clone().map(|c| points[polygons.vertex(c)]));
             match *outline {
                 [_, _, _] => local.push([0, 1, 2]),
-                [a, b, c, d] => local.extend(halve_quad([a, b, c, d], Diagonal::FromFirst)),
+                [a, b, c, d] => local.extend(halve_quad([a, b, c, d], None, Diagonal::FromFirst)),
                 _ => clip_ears(&outline, &mut local, progress)?,
             }
         }
@@ -200,9 +200,9 @@ pub(super) enum Diagonal {
     FromSecond,
 }
 
-/// Halves a quad by the diagonal that leaves no triangle turned over; by the shorter one where both
-/// will do. The wanted diagonal wins near-ties, so that rounding does not decide for squares.
-pub(super) fn halve_quad(p: [Point3<f64>; 4], wanted: Diagonal) -> [[u32; 3]; 2] {
+/// Halves a quad by the diagonal that leaves no triangle turned over; by the needed one where both will do, if one is, and else by the shorter one.
+/// The wanted diagonal wins near-ties, so that rounding does not decide for squares.
+pub(super) fn halve_quad(p: [Point3<f64>; 4], needed: Option<Diagonal>, wanted: Diagonal) -> [[u32; 3]; 2] {
     const TIE: f64 = 1.0 + 1e-6;
     // A triangle of less than this share of the quad is turned over or flat, as rounding would have it.
     const FLAT: f64 = 1e-9;
@@ -214,9 +214,10 @@ pub(super) fn halve_quad(p: [Point3<f64>; 4], wanted: Diagonal) -> [[u32; 3]; 2]
     let least = FLAT * normal.norm_squared();
     let second = if worst[0] > least && worst[1] > least {
         let [first, second] = [p[2] - p[0], p[3] - p[1]].map(|d| d.norm_squared());
-        match wanted {
-            Diagonal::FromFirst => second * TIE < first,
-            Diagonal::FromSecond => second <= first * TIE,
+        match (needed, wanted) {
+            (Some(needed), _) => needed == Diagonal::FromSecond,
+            (None, Diagonal::FromFirst) => second * TIE < first,
+            (None, Diagonal::FromSecond) => second <= first * TIE,
         }
     } else {
         worst[1] > worst[0]
@@ -229,7 +230,7 @@ mod tests {
     use super::*;
 
     fn quad(p: [[f64; 2]; 4]) -> [[u32; 3]; 2] {
-        halve_quad(p.map(|[x, y]| Point3::new(x, y, 0.0)), Diagonal::FromFirst)
+        halve_quad(p.map(|[x, y]| Point3::new(x, y, 0.0)), None, Diagonal::FromFirst)
     }
 
     #[test]
@@ -239,6 +240,19 @@ mod tests {
         // Corner 2 is reflex and its diagonal the longer one; the same with corner 1.
         assert_eq!(quad([[0.0, 0.0], [2.0, -1.5], [0.5, 0.0], [2.0, 1.5]]), [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(quad([[-9.0, 0.0], [0.0, 1.0], [9.0, 0.0], [0.0, 9.0]]), [[0, 1, 3], [1, 2, 3]]);
+    }
+
+    #[test]
+    fn the_needed_diagonal_is_taken_unless_it_turns_a_triangle_over() {
+        let flat = |p: [[f64; 2]; 4]| {
+            halve_quad(p.map(|[x, y]| Point3::new(x, y, 0.0)), Some(Diagonal::FromFirst), Diagonal::FromSecond)
+        };
+        assert_eq!(flat([[0.0, 0.0], [1.0, 0.0], [3.0, 1.0], [0.0, 1.0]]), [[0, 1, 2], [0, 2, 3]], "the longer one");
+        assert_eq!(
+            flat([[-9.0, 0.0], [0.0, 1.0], [9.0, 0.0], [0.0, 9.0]]),
+            [[0, 1, 3], [1, 2, 3]],
+            "corner 1 is reflex"
+        );
     }
 
     #[test]

@@ -194,7 +194,11 @@ impl<'a> Assembly<'a> {
             [a, b, c, d] if self.surface.own_triangles => {
                 // Not as placed: rounding there may be more than what tells the diagonals of small quads apart.
                 let corners = [a, b, c, d].map(|h| mesh.position(mesh.from(h)));
-                self.triangles.extend(halve_quad(corners, self.wanted_diagonal(entry)));
+                self.triangles.extend(halve_quad(
+                    corners,
+                    self.needed_diagonal([a, b, c, d]),
+                    self.wanted_diagonal(entry),
+                ));
             }
             _ if self.surface.own_triangles => {
                 let corners: Vec<Point3<f64>> =
@@ -205,6 +209,28 @@ impl<'a> Assembly<'a> {
         }
         self.append();
         Ok(())
+    }
+
+    /// The diagonal that a quad needs: from a corner where only one other polygon ends, if both would be halved across that corner. Then both had a diagonal between
+    /// the same two vertices, and no map with straight edges has room for what lies between them.
+    fn needed_diagonal(&self, sides: [HalfedgeId; 4]) -> Option<Diagonal> {
+        let mesh = &self.surface.mesh;
+        let is_halved_across = |side: HalfedgeId| {
+            let corners: Vec<Point3<f64>> = self.polygons.around(side).map(|h| mesh.position(mesh.from(h))).collect();
+            <[Point3<f64>; 4]>::try_from(corners)
+                .is_ok_and(|corners| halve_quad(corners, None, Diagonal::FromFirst)[0] == [0, 1, 3])
+        };
+        let is_needed = |side: HalfedgeId| {
+            let v = mesh.from(side);
+            let around: Vec<HalfedgeId> = mesh.outgoing(v).filter(|&h| self.polygons.is_side(h)).collect();
+            !mesh.is_boundary_vertex(v) && around.len() == 2 && around.into_iter().all(is_halved_across)
+        };
+        let [a, b, c, d] = sides.map(is_needed);
+        match (a || c, b || d) {
+            (true, false) => Some(Diagonal::FromFirst),
+            (false, true) => Some(Diagonal::FromSecond),
+            _ => None,
+        }
     }
 
     /// The diagonal that a quad gets where both will do: parallel to that of the quad before, as in a grid of which all

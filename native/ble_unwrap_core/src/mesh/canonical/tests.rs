@@ -236,3 +236,17 @@ fn what_is_painted_is_found_again_whatever_the_numbers() {
         }
     }
 }
+
+/// Two quads around a vertex of no other face, which their shorter diagonals pass on both sides.
+#[test]
+fn quads_that_share_two_sides_are_halved_from_their_common_corner() {
+    let positions = vec![[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, -3.0, 0.0], [0.0, 0.0, 0.2]];
+    let diamond = PolyMesh { positions, faces: vec![vec![0, 4, 1, 2], vec![1, 4, 0, 3]] };
+    for number in 0..8 {
+        let (_, canonical) = both(&diamond.renumbered(number), None);
+        let mesh = &canonical.mesh;
+        let inner: Vec<VertexId> = mesh.vertices().filter(|&v| !mesh.is_boundary_vertex(v)).collect();
+        assert_eq!(inner.len(), 1);
+        assert_eq!(mesh.neighbours(inner[0]).count(), 4, "else two edges join the same two vertices");
+    }
+}
