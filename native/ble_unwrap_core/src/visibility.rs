@@ -2,6 +2,8 @@
 //!
 //! From a sample of vertices rays are sent to the outside, more of them along the normal than aslant, as Lambert's cosine
 //! has it; the visibility is the share of them that leave the model. It is what is called ambient occlusion, seen from the other end.
+//! For one who looks from the front most of the time some rays go to where that one is, too: the groove between two eyes hides nothing from a
+//! person who stands before the face.
 
 use std::time::Duration;
 
@@ -20,6 +22,10 @@ use crate::progress::{Cancelled, Progress};
 
 /// Rays from each vertex of the sample.
 const RAYS: usize = 32;
+/// Rays from each vertex of the sample to one who stands in front.
+const FRONT_RAYS: usize = 8;
+/// One who looks from the front walks so far to the sides, as an angle: about 25°.
+const WALK: f64 = 0.44;
 /// A surface has about so many vertices in the sample at most.
 const SAMPLES: usize = 1500;
 /// A ray begins so far above its vertex, as a share of the diagonal of the model's box: far enough to leave the faces there, near enough to
@@ -31,44 +37,31 @@ const TREE: usize = 1 << 15;
 const TOGETHER: usize = 64;
 
 /// The visibility of each vertex of a mesh, from 0 to 1. The mesh says what is connected, `positions` where its vertices are beside each
-/// other. O(n log n); the rays take about a microsecond each.
+/// other, and `front`, a unit vector, whereto the model turns its face, if it has one. Then places count for as much as without a front where the surface
+/// faces that way, for two thirds where it faces sideways, and for one third where it faces away; and for no less than how well they are seen from the front. O(n log n); the
+/// rays take about a microsecond each.
 ///
 /// # Errors
 /// [`Cancelled`] if `progress` says so.
 pub(crate) fn of_vertices(
     mesh: &TriMesh,
     positions: &[Point3<f64>],
+    front: Option<Vector3<f64>>,
     progress: &Progress,
 ) -> Result<Vec<f32>, Cancelled> {
     let Some(scene) = Scene::new(mesh, positions, progress)? else { return Ok(vec![1.0; mesh.vertex_count()]) };
     let sample = Sample::new(mesh, progress)?;
-    let traced: Vec<Result<Vec<f32>, Cancelled>> = sample
-        .vertices
-        .par_chunks(TOGETHER)
-        .map(|vertices| {
-            progress.check()?;
-            Ok(vertices.iter().map(|&v| scene.visibility(v)).collect())
-        })
-        .collect();
-    let mut of_sample = Vec::with_capacity(sample.vertices.len());
-    for chunk in traced {
-        of_sample.extend(chunk?);
-    }
-    sample.spread(mesh, &of_sample, progress)
-}
-
-/// Visibilities for one who looks from a direction most of the time: as they are where the surface faces that way, two thirds where it faces
-/// sideways, and one third where it faces away. O(n).
-pub(crate) fn from_the_front(
-    mesh: &TriMesh,
-    positions: &[Point3<f64>],
-    front: Vector3<f64>,
-    visibility: &[f32],
-) -> Vec<f32> {
-    let facing = |v: VertexId| normal(mesh, positions, v).map_or(0.0, |normal| normal.dot(&front));
-    #[expect(clippy::cast_possible_truncation, reason = "a share")]
-    let seen = |(v, visible): (VertexId, &f32)| visible * ((2.0 + facing(v)) / 3.0) as f32;
-    mesh.vertices().zip(visibility).map(seen).collect()
+    let around = sample.measured(mesh, |v| scene.visibility(v), progress)?;
+    let Some(front) = front else { return Ok(around) };
+    let before = cone(front);
+    let from_there = sample.measured(mesh, |v| scene.visibility_from(v, &before), progress)?;
+    let seen = |v: VertexId| {
+        let facing = normal(mesh, positions, v).map_or(0.0, |normal| normal.dot(&front));
+        #[expect(clippy::cast_possible_truncation, reason = "a share")]
+        let [usual, aslant] = [(2.0 + facing) / 3.0, facing.max(0.0)].map(|share| share as f32);
+        (around[v.index()] * usual).max(from_there[v.index()] * aslant)
+    };
+    Ok(mesh.vertices().map(seen).collect())
 }
 
 /// The mean normal of the faces at a vertex, by area; `None` where they have none.
@@ -126,6 +119,17 @@ impl<'a> Scene<'a> {
         self.directions.iter().filter(leaves).count() as f32 / self.directions.len() as f32
     }
 
+    /// The share of rays in some directions that leave the model.
+    fn visibility_from(&self, v: VertexId, directions: &[Vector3<f64>]) -> f32 {
+        let Some((normal, _)) = self.frame(v) else { return 1.0 };
+        let origin = single(self.positions[v.index()].coords + ABOVE * normal);
+        let leaves = |d: &&Vector3<f64>| {
+            let ray = Ray::new_inf(origin, single(**d));
+            normal.dot(d) > 0.0 && self.trees.iter().all(|tree| tree.is_missed(ray))
+        };
+        directions.iter().filter(leaves).count() as f32 / directions.len() as f32
+    }
+
     /// The normal at a vertex and a direction at right angles to it, which turn with the model; `None` where there is no area.
     fn frame(&self, v: VertexId) -> Option<(Vector3<f64>, Vector3<f64>)> {
         let at = |v: VertexId| self.positions[v.index()];
@@ -173,6 +177,15 @@ fn hemisphere(count: usize) -> Vec<Vector3<f64>> {
     (0..count).map(direction).collect()
 }
 
+/// Directions around one, none farther from it than [`WALK`].
+fn cone(axis: Vector3<f64>) -> Vec<Vector3<f64>> {
+    let beside = if axis.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
+    let along = axis.cross(&beside).normalize();
+    let across = axis.cross(&along);
+    let narrow = |d: Vector3<f64>| (axis + WALK.tan() * (along * d.x + across * d.y)).normalize();
+    hemisphere(FRONT_RAYS).into_iter().map(narrow).collect()
+}
+
 /// Some vertices of a mesh, spread evenly, and which of them is near each vertex.
 struct Sample {
     vertices: Vec<VertexId>,
@@ -216,6 +229,22 @@ impl Sample {
         Ok(Self { vertices, near, apart })
     }
 
+    /// Values of all vertices, of which those of the sample are measured.
+    fn measured(
+        &self,
+        mesh: &TriMesh,
+        measure: impl Fn(VertexId) -> f32 + Sync,
+        progress: &Progress,
+    ) -> Result<Vec<f32>, Cancelled> {
+        let some = |vertices: &[VertexId]| {
+            progress.check()?;
+            Ok(vertices.iter().map(|&v| measure(v)).collect())
+        };
+        let measured: Vec<Result<Vec<f32>, Cancelled>> = self.vertices.par_chunks(TOGETHER).map(some).collect();
+        let measured = measured.into_iter().collect::<Result<Vec<_>, Cancelled>>()?;
+        self.spread(mesh, &measured.concat(), progress)
+    }
+
     /// Values of the sample on all vertices, smoothed as widely as the sample is apart.
     fn spread(&self, mesh: &TriMesh, of_sample: &[f32], progress: &Progress) -> Result<Vec<f32>, Cancelled> {
         let mut values: Vec<f32> = self.near.iter().map(|&i| of_sample[i as usize]).collect();
@@ -240,7 +269,7 @@ mod tests {
     use crate::mesh::test_surfaces;
 
     fn seen(mesh: &TriMesh, positions: &[Point3<f64>]) -> Vec<f32> {
-        of_vertices(mesh, positions, &Progress::new()).expect("not cancelled")
+        of_vertices(mesh, positions, None, &Progress::new()).expect("not cancelled")
     }
 
     #[test]
@@ -312,11 +341,30 @@ mod tests {
     #[test]
     fn from_the_front_the_front_is_seen_most() {
         let ball = test_surfaces::sphere(2);
-        let all = vec![1.0; ball.vertex_count()];
-        let seen = from_the_front(&ball, ball.positions(), Vector3::new(0.0, -1.0, 0.0), &all);
+        let front = Some(Vector3::new(0.0, -1.0, 0.0));
+        let seen = of_vertices(&ball, ball.positions(), front, &Progress::new()).expect("not cancelled");
         for (p, seen) in ball.positions().iter().zip(seen) {
             assert!((f64::from(seen) - (2.0 - p.y / p.coords.norm()) / 3.0).abs() < 0.02, "{p} {seen}");
         }
+    }
+
+    /// The bottom of a ditch that runs up the middle of a wall: from the side it is hidden, from the front it is not.
+    #[test]
+    fn a_groove_that_one_looks_into_is_seen() {
+        let flat = test_surfaces::grid(20, 20, [2.0, 2.0], 0.0);
+        let ditch: Vec<Point3<f64>> = flat
+            .positions()
+            .iter()
+            .map(|p| Point3::new(p.x, p.y, if (p.x - 1.0).abs() < 0.05 { -0.3 } else { 0.0 }))
+            .collect();
+        let bottom = flat.vertices().filter(|v| ditch[v.index()].z < 0.0 && (ditch[v.index()].y - 1.0).abs() < 0.5);
+        let bottom: Vec<VertexId> = bottom.collect();
+        let mean = |front: Option<Vector3<f64>>| {
+            let seen = of_vertices(&flat, &ditch, front, &Progress::new()).expect("not cancelled");
+            bottom.iter().map(|v| seen[v.index()]).sum::<f32>() / bottom.len() as f32
+        };
+        let (anywhere, front, side) = (mean(None), mean(Some(Vector3::z())), mean(Some(Vector3::x())));
+        assert!(anywhere < 0.65 && side < anywhere && front > 0.8, "{anywhere} {front} {side}");
     }
 
     #[test]
@@ -327,6 +375,6 @@ mod tests {
         assert!(seen(&TriMesh::default(), &[]).is_empty());
         let progress = Progress::new();
         progress.cancel();
-        assert!(of_vertices(&mesh, mesh.positions(), &progress).is_err());
+        assert!(of_vertices(&mesh, mesh.positions(), None, &progress).is_err());
     }
 }

@@ -74,16 +74,14 @@ impl Prepared {
             return Ok(None);
         }
         let mesh = &self.surface.mesh;
+        let front = settings.front.direction();
         let key = |f: &mut Fingerprint| {
             f.mesh(mesh);
             f.reals(positions.iter().flat_map(|p| [p.x, p.y, p.z]));
+            f.reals(front.iter().flatten().copied());
         };
         let bytes = |values: &Vec<f32>| 4 * values.len();
-        let compute = || visibility::of_vertices(mesh, positions, run.progress);
-        let visibility = run.recall(Kind::Visibility, key, bytes, compute)?;
-        Ok(Some(match settings.front.direction() {
-            Some(front) => Arc::new(visibility::from_the_front(mesh, positions, front.into(), &visibility)),
-            None => visibility,
-        }))
+        let compute = || visibility::of_vertices(mesh, positions, front.map(Into::into), run.progress);
+        Ok(Some(run.recall(Kind::Visibility, key, bytes, compute)?))
     }
 }
