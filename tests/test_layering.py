@@ -213,7 +213,7 @@ CUTTING = [
     {"attempt"},
     {"trial", "divide"},
     {"search"},
-    {"moves/join", "moves/partial_join", "moves/hand_over", "moves/across", "moves/zip"},
+    {"moves/join", "moves/partial_join", "moves/hand_over", "moves/across", "moves/zip", "moves/face"},
     {"whole", "atlas_limit", "moves/fold"},
     {"level/carry", "level/prolong", "level/mod"},
     {"symmetric", "alike"},

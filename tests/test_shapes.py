@@ -364,7 +364,7 @@ def test_a_torus_is_one_or_two_rectangles(name, number, kind):
         assert_rectangle(layout, chart)
 
 
-@cases("torus", short={"the cut is elsewhere, and steps aside": ["1*"]})
+@cases("torus", short={"the cut is elsewhere, and steps aside": ["1, triangles", "1, turned"]})
 def test_a_torus_is_cut_along_its_inner_equator(name, number, kind):
     layout, _ = unwrapped(name, number, kind)
     base = common_shapes.mesh(name, number).positions
@@ -487,14 +487,7 @@ def head_seams(number, kind):
     return 0.5 * (a + b), np.linalg.norm(a - b, axis=1)
 
 
-@cases(
-    "head",
-    kinds=(0, 1),
-    short={
-        "a seam runs down the forehead": ["3"],
-        "where quads are triangles, no symmetry is seen, and seams go around an ear": ["3, triangles"],
-    },
-)
+@cases("head", kinds=(0, 1))
 def test_no_seam_is_on_the_face(name, number, kind):
     middle, length = head_seams(number, kind)
     assert not length[(middle[:, 1] < -0.25) & (middle[:, 2] < 0.7)].sum()

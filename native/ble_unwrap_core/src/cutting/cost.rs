@@ -42,6 +42,9 @@ const AT_REST: f64 = 1e-3;
 
 /// A seam that nobody can see counts for this share of its length: no seam is for nothing.
 const LEAST_WEIGHT: f64 = 0.1;
+/// A seam in a mirror plane counts for so many times as much where more can be seen of it than of other places: it runs down the middle of a face. The map of
+/// one that is whole is stretched by 2 per cent more.
+const FACE: f64 = 3.0;
 /// What is glued of a border is at least so many times as long as the square root of the smaller chart's area: a chart that hangs on
 /// by less is no easier to paint than one by itself.
 pub(super) const LEAST_GLUED: f64 = 0.2;
@@ -102,6 +105,11 @@ pub(super) fn weighed(
     Arc::new(TriMesh::clone(mesh).with_seam_weights(seam_weight))
 }
 
+/// How much dearer a seam along an edge is than one of the same length at a place that is seen as much as others.
+pub(super) fn dearness(mesh: &TriMesh, h: HalfedgeId) -> f64 {
+    mesh.edge_length(h) * (mesh.border_cost(h) - 1.0)
+}
+
 /// The prices on one surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Price {
@@ -114,13 +122,22 @@ pub(crate) struct Price {
     is_exact: bool,
     /// [`Settings::straighten`].
     straight: f64,
+    /// How much more is disliked about charts than about those that are to come in their place, beside what each costs.
+    disliked: f64,
 }
 
 impl Price {
     pub(crate) fn new(mesh: &TriMesh, settings: &Settings) -> Self {
         let stretch = settings.stretch_price;
         let area = measure::total_area(mesh).max(f64::MIN_POSITIVE);
-        Self { area, stretch, may_bend: may_bend(stretch), is_exact: false, straight: settings.straighten }
+        Self {
+            area,
+            stretch,
+            may_bend: may_bend(stretch),
+            is_exact: false,
+            straight: settings.straighten,
+            disliked: 0.0,
+        }
     }
 
     /// The same prices where what unrolls is worth no more than what does not: two halves that only their mirror plane keeps apart.
@@ -131,6 +148,11 @@ impl Price {
     /// The same prices where what unrolls is stretched no more than it is already: to hang on by a part of a border is no reason to bend.
     pub(super) fn exact(self) -> Self {
         Self { is_exact: true, ..self }
+    }
+
+    /// The same prices where so much less seam is to run down the middle of a face.
+    pub(super) fn with_mended_face(self, length: f64) -> Self {
+        Self { disliked: (FACE - 1.0) * self.of_seam(length), ..self }
     }
 
     /// What some length of seam costs.
@@ -156,6 +178,11 @@ impl Price {
         CHART + 0.5 * self.of_seam(seam) + self.of_stretch(chart, chart.l2)
     }
 
+    /// What the charts cost that come in the place of others.
+    pub(super) fn of_all(&self, new: &[Chart]) -> f64 {
+        new.iter().map(|chart| self.of(chart)).sum::<f64>() - self.disliked
+    }
+
     /// The stretch up to which a patch is made one chart. With more, a cut may be worth its seam, if it took all of the stretch away
     /// and were as long as the patch is wide. Where it was not, the parts are joined again.
     pub(super) fn limit(&self, patch: &Patch, settings: &Settings) -> f64 {
@@ -164,9 +191,9 @@ impl Price {
         settings.stretch_limit.min((1.0 + 1.0 / (self.stretch * width)).sqrt())
     }
 
-    /// The L2 stretch that one chart may have if it is to be worth those in whose place it would come ([`Price::is_worth`]), where so much
-    /// seam between and inside them is glued and none is opened. A trial under this limit ends as soon as that is out of reach.
-    pub(super) fn limit_of_union(&self, old: &[&Chart], glued: f64, settings: &Settings) -> f64 {
+    /// The L2 stretch that one chart may have if it is to be worth those in whose place it would come ([`Price::is_worth`]), where so much less
+    /// seam is left between and inside them. A trial under this limit ends as soon as that is out of reach.
+    pub(super) fn limit_of_union(&self, old: &[&Chart], saved: f64, settings: &Settings) -> f64 {
         if may_bend(self.stretch) {
             return settings.stretch_limit;
         }
@@ -178,9 +205,9 @@ impl Price {
             return settings.stretch_limit.min(most);
         }
         let share = old.iter().map(|chart| chart.patch.area()).sum::<f64>() / self.area;
-        let saved = CHART * (old.len() as f64 - 1.0) + self.of_seam(glued);
-        let stretch = saved + old.iter().map(|chart| self.of_stretch(chart, chart.l2)).sum::<f64>();
-        settings.stretch_limit.min((1.0 + stretch / (self.stretch * share)).sqrt())
+        let seams = CHART * (old.len() as f64 - 1.0) + self.of_seam(saved) + self.disliked;
+        let stretch = seams + old.iter().map(|chart| self.of_stretch(chart, chart.l2)).sum::<f64>();
+        settings.stretch_limit.min((1.0 + stretch.max(0.0) / (self.stretch * share)).sqrt())
     }
 
     /// Whether a chart is better with another L2 stretch and so much more of its border, by its length on the surface, straight along the axes.
@@ -201,9 +228,7 @@ impl Price {
                 return false;
             }
         }
-        let before: f64 = old.iter().map(|chart| self.of(chart)).sum();
-        let after: f64 = new.iter().map(|chart| self.of(chart)).sum();
-        after < before
+        self.of_all(new) < old.iter().map(|chart| self.of(chart)).sum()
     }
 }
 

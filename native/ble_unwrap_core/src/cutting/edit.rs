@@ -6,7 +6,7 @@ use crate::mesh::{FaceId, HalfedgeId, TriMesh};
 use super::state::{ChartId, Cutting};
 
 /// A change of a [`Cutting`].
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Edit {
     /// Both sides of seams that will be none, ascending.
     glue: Vec<HalfedgeId>,
@@ -38,12 +38,18 @@ impl Edit {
         &self.glue
     }
 
-    /// How much seam it glues.
-    pub(super) fn glued_length(&self, cutting: &Cutting<'_>) -> f64 {
-        0.5 * self.glue.iter().map(|&h| cutting.seam_length(h)).sum::<f64>()
+    /// Both sides of the edges that it opens, ascending.
+    pub(super) fn opened(&self) -> &[HalfedgeId] {
+        &self.open
     }
 
-    /// How long the edges are that it opens, however much a seam there counts for.
+    /// How much less seam there is after it, of what seams count for.
+    pub(super) fn saved_length(&self, cutting: &Cutting<'_>) -> f64 {
+        let length = |edges: &[HalfedgeId]| edges.iter().map(|&h| cutting.seam_length(h)).sum::<f64>();
+        0.5 * (length(&self.glue) - length(&self.open))
+    }
+
+    /// How long the edges are that it opens, however much seams there count for.
     pub(super) fn opened_length(&self, cutting: &Cutting<'_>) -> f64 {
         0.5 * self.open.iter().map(|&h| cutting.mesh().edge_length(h)).sum::<f64>()
     }

@@ -17,6 +17,8 @@ pub(super) enum MoveKind {
     PartialJoin,
     /// A cut in a chart is closed from its end on.
     Zip,
+    /// A cut along the mirror plane is closed where it can be seen, for darts in pairs.
+    Face,
 }
 
 /// Where a move is made, for as long as the charts there stay what they are.

@@ -62,7 +62,7 @@ pub(super) fn search(
 fn rung_of(kind: MoveKind) -> Rung {
     match kind {
         MoveKind::Join | MoveKind::JoinAnew => Rung::Merge,
-        MoveKind::PartialJoin => Rung::Dart,
+        MoveKind::PartialJoin | MoveKind::Face => Rung::Dart,
         MoveKind::Zip => Rung::Zip,
     }
 }
@@ -92,17 +92,17 @@ pub(super) fn tried(
 ) -> Result<(Verdict, Rungs), Cancelled> {
     let mut rungs = Rungs::default();
     let mut verdict = Verdict::Refused;
-    let price = price.map(|price| made.price(*price));
     let old: Vec<&Chart> = site.charts.iter().filter_map(|&id| cutting.chart(id)).collect();
     let mut best: Option<(f64, Vec<Chart>)> = None;
     let mut made_by: Vec<Edit> = Vec::new();
     for way in made.ways(cutting, site, run)? {
         // From another start the same edit makes the same charts, or hardly better ones.
-        if made_by.iter().any(|edit| edit.glued() == way.edit.glued()) {
+        if made_by.contains(&way.edit) {
             continue;
         }
-        let glued = way.edit.glued_length(cutting);
-        let stretch_limit = price.map_or(settings.stretch_limit, |price| price.limit_of_union(&old, glued, settings));
+        let price = price.map(|price| made.price(*price, cutting, &way.edit));
+        let saved = way.edit.saved_length(cutting);
+        let stretch_limit = price.map_or(settings.stretch_limit, |price| price.limit_of_union(&old, saved, settings));
         if price.is_some() && cost::is_out_of_reach(&old, stretch_limit) {
             continue;
         }
@@ -114,7 +114,7 @@ pub(super) fn tried(
                 if price.is_some_and(|price| !price.is_worth(&old, &charts)) {
                     continue;
                 }
-                let cost = price.map_or(0.0, |price| charts.iter().map(|chart| price.of(chart)).sum());
+                let cost = price.map_or(0.0, |price| price.of_all(&charts));
                 if !made.takes_cheapest() {
                     return Ok((Verdict::Charts(charts), rungs));
                 }

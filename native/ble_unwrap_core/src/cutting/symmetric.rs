@@ -16,8 +16,10 @@ use crate::settings::{LimitOver, Moves, Settings, Symmetry};
 use super::attempt;
 use super::copied::copied;
 use super::cost::{self, Price};
+use super::edit::Edit;
 use super::history::{History, MoveKind};
 use super::merged::Merged;
+use super::moves::face::Face;
 use super::moves::join::{Join, Which};
 use super::moves::partial_join::PartialJoin;
 use super::moves::zip::Zip;
@@ -145,7 +147,12 @@ fn by_halves(
     let zip = Zip { limit: settings.stretch_limit };
     let moves = [&Join { which: Which::EVERY, alone: MOST_ALONE } as &dyn Move, &PartialJoin::MostSeen, &zip];
     let moves = moves.map(|inner| InPlane { inner, mirror, embeds: !is_large });
-    let moves: Vec<&dyn Move> = moves.iter().map(|made| made as &dyn Move).collect();
+    let mut moves: Vec<&dyn Move> = moves.iter().map(|made| made as &dyn Move).collect();
+    let face = Face { mirror, settings };
+    // A map of a large one takes too long to be made so many times.
+    if !is_large {
+        moves.push(&face);
+    }
     search(&mut cutting, &mut History::default(), &moves, settings, &mut rungs, run)?;
     Ok(Some((cutting.into_charts(), rungs)))
 }
@@ -166,6 +173,21 @@ impl InPlane<'_> {
         cutting.owner(self.mirror.likeness.image(side).face())
     }
 
+    /// What closes a cut of a chart that is its own image closes the image of that cut, too.
+    fn in_pairs(&self, cutting: &Cutting<'_>, site: &mut Site) -> bool {
+        let is_whole = site.charts.iter().all(|&id| self.image(cutting, id) == Some(id));
+        if self.kind() != MoveKind::Zip || !is_whole {
+            return false;
+        }
+        let is_seam = |h: &HalfedgeId| !h.is_none() && cutting.is_seam(*h);
+        for way in &mut site.ways {
+            let here = way.edit.glued().to_vec();
+            let there = here.iter().map(|&h| self.mirror.likeness.image(h)).filter(is_seam);
+            way.edit = Edit::new(cutting.mesh(), &here.iter().copied().chain(there).collect::<Vec<_>>(), &[]);
+        }
+        true
+    }
+
     fn is_symmetric(&self, cutting: &Cutting<'_>, proposal: &Proposal) -> bool {
         proposal.edit.glued().iter().all(|&h| self.mirror.is_between(cutting.mesh(), h))
     }
@@ -177,7 +199,7 @@ impl Move for InPlane<'_> {
     }
 
     // They were divided for the sake of symmetry, not because they unroll.
-    fn price(&self, usual: Price) -> Price {
+    fn price(&self, usual: Price, _cutting: &Cutting<'_>, _edit: &Edit) -> Price {
         usual.bending()
     }
 
@@ -189,6 +211,9 @@ impl Move for InPlane<'_> {
     fn sites(&self, cutting: &Cutting<'_>, history: &History, price: &Price) -> Vec<Site> {
         let mut sites = self.inner.sites(cutting, history, price);
         sites.retain_mut(|site| {
+            if self.in_pairs(cutting, site) {
+                return true;
+            }
             let is_pair = match site.charts[..] {
                 [a, b] => self.image(cutting, a) == Some(b),
                 _ => true,

@@ -48,6 +48,11 @@ impl Mirror {
         (0..self.in_first.len()).filter(|&f| self.in_first[f]).map(FaceId::new).collect()
     }
 
+    /// Whether a face is in the half of the first face.
+    pub(crate) fn is_in_first(&self, f: FaceId) -> bool {
+        self.in_first[f.index()]
+    }
+
     /// The mirror plane, where the vertices of the mesh are at these positions.
     pub(crate) fn plane(&self, mesh: &TriMesh, positions: &[Point3<f64>]) -> Option<Plane> {
         let at = |v: VertexId| positions[v.index()];

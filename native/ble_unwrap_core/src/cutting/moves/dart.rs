@@ -94,7 +94,13 @@ impl<'a> Bulging<'a> {
 
     /// The patch cut from its tip to the boundary, or on a closed surface to its root.
     fn with_dart(&self) -> Option<Patch> {
-        cut_to(&self.patch, self.bulge.enclosed.or(self.bulge.tip)?, self.bulge.root, self.cut)
+        let (tip, root) = self.ends()?;
+        cut_to(&self.patch, tip, root, self.cut)
+    }
+
+    /// The inner vertex that a dart is to be cut from, and on a closed surface the one it is cut to. `None` where nothing bulges.
+    pub(crate) fn ends(&self) -> Option<(VertexId, Option<VertexId>)> {
+        Some((self.bulge.enclosed.or(self.bulge.tip)?, self.bulge.root))
     }
 }
 

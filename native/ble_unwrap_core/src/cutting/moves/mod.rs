@@ -1,10 +1,11 @@
 //! What may be changed about a cutting. A move looks at the cutting and proposes edits; it flattens nothing itself.
 //!
 //! Moves on a patch that has no map to the plane yet say where to cut it: [`split`], [`dart`], [`net`]. Moves on charts make
-//! fewer or better ones of them: [`join`], [`partial_join`], [`zip`], [`hand_over`], [`across`], [`fold`].
+//! fewer or better ones of them: [`join`], [`partial_join`], [`zip`], [`face`], [`hand_over`], [`across`], [`fold`].
 
 pub(super) mod across;
 pub(super) mod dart;
+pub(super) mod face;
 pub(super) mod fold;
 pub(super) mod hand_over;
 pub(super) mod join;
@@ -61,8 +62,8 @@ pub(super) struct Site {
 pub(super) trait Move: Sync {
     fn kind(&self) -> MoveKind;
 
-    /// The prices that the move is judged by.
-    fn price(&self, usual: Price) -> Price {
+    /// The prices that an edit which the move proposes is judged by.
+    fn price(&self, usual: Price, _cutting: &Cutting<'_>, _edit: &Edit) -> Price {
         usual
     }
 

@@ -44,7 +44,7 @@ impl Move for PartialJoin {
         MoveKind::PartialJoin
     }
 
-    fn price(&self, usual: Price) -> Price {
+    fn price(&self, usual: Price, _cutting: &Cutting<'_>, _edit: &Edit) -> Price {
         usual.exact()
     }
 
