@@ -13,7 +13,7 @@ from . import settings_table
 
 # What an artist wants of the result whatever the method: presets leave these alone, and the native module, whose
 # presets have values of their own for them, always gets them.
-KEPT_BY_PRESETS = ("stretch_limit", "texture_size", "margin", "tiles", "texel_density")
+KEPT_BY_PRESETS = ("stretch_limit", "texture_size", "margin", "tiles", "texel_density", "front")
 # Preset -> the UV map that it is for: a lightmap has its own beside that of the materials, found again by its name.
 PRESET_MAPS = {"LIGHTMAP": {"uv_map": "NEW", "uv_map_name": "Lightmap"}}
 # Preset -> what it differs in from the defaults; shown in the panel when the preset is chosen.

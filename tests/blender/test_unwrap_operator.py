@@ -517,3 +517,23 @@ def test_spiral_ramp_is_beyond_smart_uv_project(addon):
     assert rows["ble_unwrap"]["blender_overlapping_faces"] == 0
     assert rows["smart_uv_best"]["overlaps"] > 0
     assert rows["smart_uv_best"]["blender_overlapping_faces"] > 0
+
+
+def test_suzannes_face_is_whole_and_her_seams_are_mirrored():
+    bpy.ops.mesh.primitive_monkey_add()
+    obj = bpy.context.object
+    unwrap()
+    assert_good(obj)
+    mesh, place = obj.data, uvs(obj)
+    sides: dict[int, list] = {}
+    for polygon in mesh.polygons:
+        loops = list(polygon.loop_indices)
+        for here, after in zip(loops, [*loops[1:], loops[0]], strict=True):
+            ends = {mesh.loops[loop].vertex_index: tuple(place[loop]) for loop in (here, after)}
+            sides.setdefault(mesh.loops[here].edge_index, []).append(ends)
+    seams = [mesh.edges[edge] for edge, maps in sides.items() if len(maps) == 2 and maps[0] != maps[1]]
+    ends = [[mesh.vertices[v] for v in edge.vertices] for edge in seams]
+    in_the_middle = [pair for pair in ends if all(abs(v.co.x) < 1e-4 and v.normal.y < -0.3 for v in pair)]
+    assert ends and not in_the_middle
+    middles = {tuple(np.round((a.co + b.co) / 2, 4) + 0.0) for a, b in ends}
+    assert {tuple(np.array((-x, y, z)) + 0.0) for x, y, z in middles} == middles
