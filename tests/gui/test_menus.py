@@ -22,7 +22,7 @@ def count(commands, operator):
 def test_uv_menu_of_the_3d_view_has_the_entry_once(window):
     scenes.edit(scenes.cube())
     commands = yield from all_entries(window, "VIEW3D_MT_uv_map", "VIEW_3D")
-    assert count(commands, "uv.unwrap") == 2, f"Blender's own, by two methods: {commands}"
+    assert count(commands, "uv.unwrap") > 0, f"Blender's own are there: {commands}"
     assert count(commands, "uv.ble_unwrap") == 1, commands
 
 

@@ -38,8 +38,7 @@ def test_overlays_are_drawn_and_leave_no_trace(window):
     before, plain = traces(obj), viewport(window)
     for number, kind in enumerate(KINDS):
         along = 0.5 if kind == "SEAMS" else 0.2 + 0.3 * number
-        # Blender leaves out what is the default.
-        wanted = "bpy.ops.uv.ble_unwrap_show()" if kind == KINDS[0] else f"bpy.ops.uv.ble_unwrap_show(kind='{kind}')"
+        wanted = f"bpy.ops.uv.ble_unwrap_show(kind='{kind}')"
         x, y = yield from window.find(region, lambda text, wanted=wanted: text == wanted, along)
         yield from window.click(x, y)
         yield from window.rest()

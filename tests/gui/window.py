@@ -11,7 +11,7 @@ import numpy as np
 from driver import Wait
 
 TURNS_OF_AN_EVENT = 2  # the turn in which Blender takes the event, and one in which it has drawn what follows from it
-SWEEP_PIXELS = 9  # less than half a button's height: none is missed
+SWEEP_PIXELS = 12  # less than a button's height: none is missed
 LONGEST_MENU = 45  # entries; the UV editor's menu of Blender 5.2 has 30
 
 
