@@ -136,7 +136,12 @@ def main():
         names.append(blender.name)
         launch.say(f"\n==== {blender.name} ====")
         with launch.Profile(blender) as profile:
-            environment = prepare(profile, archive, library)
+            try:
+                environment = prepare(profile, archive, library)
+            except launch.Unavailable as error:
+                launch.say(str(error))
+                total["broken off"] = total.get("broken off", 0) + 1
+                continue
             for path in files:
                 for result in run_file(blender, profile, environment, path, words, until):
                     total[result["outcome"]] = total.get(result["outcome"], 0) + 1
