@@ -1,4 +1,5 @@
 # make test   everything: Rust, the wheel, Python without Blender, the add-on in every bpy that can be had
+# make test-gui  the add-on by mouse and keys in windows of real Blenders (4.3, 5.2), which Debian as root can have; pictures: out/gui
 # make demo   unwrap the demonstration meshes and compare with Smart UV Project: out/
 # make settings  what README, type stub, documentation and add-on say of the settings, from the core's table
 # make bench  times of the stages; make flamegraph where the time of one unwrap goes; make scaling time and memory against faces
@@ -11,7 +12,8 @@
 # Knobs: PYTHON (3.11 or later), CARGO, MESH=file for the demo and the flame graph (.obj), BLENDER=/path/to/blender for a
 # real one instead of bpy, MODELS="a.obj b.obj" for the paper's figure 3 and its table, for the scaling and the quality (.ply,
 # .ply.gz, too), for the packing, the shapes and the contact sheet, COMPARE=smart for a third picture a model there, SHUFFLES=4 for the quality,
-# PACKERS="ours xatlas" and SECONDS=60 (of sparrow, a set) for the packing.
+# PACKERS="ours xatlas" and SECONDS=60 (of sparrow, a set) for the packing, SUITES="trixie sid" for the windows and ALLOW_NONE=1 where
+# having none is no error.
 
 PYTHON ?= python3
 CARGO ?= cargo
@@ -22,7 +24,7 @@ CRATES := native/ble_unwrap_core native/ble_unwrap_native
 # What the wheel is made of. Official Blender runs on glibc 2.28, which zig links against on any newer system.
 NATIVE := Cargo.toml Cargo.lock .ci/build_wheel .ci/third_party_licenses $(shell find $(CRATES) -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name settings.txt 2>/dev/null)
 
-.PHONY: test test-rust test-python test-blender settings bench flamegraph scaling quality packing shapes contact-sheet lint format venv wheel zip demo \
+.PHONY: test test-rust test-python test-blender test-gui settings bench flamegraph scaling quality packing shapes contact-sheet lint format venv wheel zip demo \
 	paper paper-page clean
 
 test: test-rust lint test-python test-blender
@@ -68,6 +70,11 @@ test-python: $(VENV)/.wheel
 test-blender: zip
 	.ci/blender_libraries
 	$(BIN)/python .ci/test_blender
+
+# Not a part of `make test`, which needs no root: .ci/run does both.
+test-gui: zip
+	.ci/debootstrap
+	$(BIN)/python tests/gui/run.py $(if $(SUITES),--suite $(SUITES)) $(if $(ALLOW_NONE),--allow-none)
 
 lint: $(VENV)/.ready
 	$(BIN)/ruff check .

@@ -4,7 +4,17 @@ import json
 
 import bpy
 
-from . import last_check, last_comparison, last_result, overlay, overlay_colours, overlay_legend, properties, targets
+from . import (
+    last_check,
+    last_comparison,
+    last_result,
+    overlay,
+    overlay_colours,
+    overlay_legend,
+    properties,
+    running,
+    targets,
+)
 
 CATEGORY = "BLE Unwrap"
 STATUS_ICONS = {"HEAD": "DOT", "OK": "CHECKMARK", "BAD": "ERROR", "WARN": "INFO", "INFO": "BLANK1"}
@@ -50,14 +60,19 @@ class _Main:
 
     def draw(self, context):
         layout = self.layout
-        row = layout.row()
-        row.scale_y = 1.4
-        row.operator_context = "INVOKE_DEFAULT"
-        row.operator("uv.ble_unwrap", icon="UV")
-        row = layout.row()
-        row.operator_context = "INVOKE_DEFAULT"
-        row.operator("uv.ble_unwrap_pack", text="Pack Only")
-        draw_settings(layout, context, ("preset", *properties.MAIN_SETTINGS))
+        if running.is_there():
+            running.draw(layout)
+        else:
+            row = layout.row()
+            row.scale_y = 1.4
+            row.operator_context = "INVOKE_DEFAULT"
+            row.operator("uv.ble_unwrap", icon="UV")
+            row = layout.row()
+            row.operator_context = "INVOKE_DEFAULT"
+            row.operator("uv.ble_unwrap_pack", text="Pack Only")
+        column = layout.column()
+        column.enabled = not running.is_there()  # it would come too late
+        draw_settings(column, context, ("preset", *properties.MAIN_SETTINGS))
 
 
 class _Certificate:
@@ -70,6 +85,7 @@ class _Certificate:
         return last_result.is_true(context)
 
     def draw(self, context):
+        self.layout.enabled = not running.is_there()
         certificate = context.window_manager.ble_unwrap_certificate
         column = self.layout.column(align=True)
         column.label(text=certificate.title, icon="UV")
@@ -96,6 +112,7 @@ class _Check:
     bl_region_type = "UI"
 
     def draw(self, context):
+        self.layout.enabled = not running.is_there()
         layout = self.layout
         layout.operator("uv.ble_unwrap_check", icon="VIEWZOOM")
         if not last_check.title():
@@ -122,6 +139,7 @@ class _Show:
     bl_region_type = "UI"
 
     def draw(self, _context):
+        self.layout.enabled = not running.is_there()
         layout = self.layout
         row = layout.row(align=True)
         for kind, text in (("CHECKER", "Checker"), ("STRETCH", "Stretch"), ("ISLANDS", "Islands")):
@@ -143,6 +161,7 @@ class _Compare:
     bl_region_type = "UI"
 
     def draw(self, _context):
+        self.layout.enabled = not running.is_there()
         layout = self.layout
         if not last_comparison.is_there():
             layout.operator_context = "INVOKE_DEFAULT"
@@ -172,6 +191,7 @@ class _Advanced:
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
+        self.layout.enabled = not running.is_there()
         for title, names in properties.ADVANCED_SETTINGS:
             if not panel_settings(context.scene.ble_unwrap, context, names):
                 continue

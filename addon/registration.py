@@ -12,12 +12,24 @@ from . import (
     preferences,
     properties,
 )
-from .operators import align, check, compare, pack, relax, select_edges, select_faulty, select_narrow, unwrap
+from .operators import (
+    again,
+    align,
+    cancel,
+    check,
+    compare,
+    pack,
+    relax,
+    select_edges,
+    select_faulty,
+    select_narrow,
+    unwrap,
+)
 from .operators import overlay as show
 
 MODULES = (
     *(preferences, properties, last_result, last_check, last_comparison, overlay, overlay_legend),
-    *(unwrap, pack, align, relax, check, show, compare, select_edges, select_narrow, select_faulty),
+    *(again, cancel, unwrap, pack, align, relax, check, show, compare, select_edges, select_narrow, select_faulty),
     *(panel, menu, command),
 )
 

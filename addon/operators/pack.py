@@ -3,8 +3,9 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
-from .. import faces, last_result, preferences, properties, targets
+from .. import faces, last_result, preferences, properties, running, targets
 from ..pack_task import PackTask
+from . import again
 from .map_poll import has_map
 from .with_progress import WithProgress, redraw
 
@@ -64,7 +65,8 @@ class UV_OT_ble_unwrap_pack(WithProgress, bpy.types.Operator):
         return has_map(cls, context)
 
     def invoke(self, context, _event):
-        properties.copy_unset(self.properties, context.scene.ble_unwrap, properties.PACK_SETTINGS)
+        if not again.is_invoked():
+            properties.copy_unset(self.properties, context.scene.ble_unwrap, properties.PACK_SETTINGS)
         self.from_sidebar = True
         return self.compute(context, in_background=not bpy.app.background)
 
@@ -73,6 +75,9 @@ class UV_OT_ble_unwrap_pack(WithProgress, bpy.types.Operator):
 
     def draw(self, _context):
         layout = self.layout
+        if running.is_there():
+            running.draw(layout)
+            return
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()

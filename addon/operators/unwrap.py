@@ -3,9 +3,10 @@
 import bpy
 from bpy.props import BoolProperty
 
-from .. import faces, kept_analysis, last_result, preferences, properties, targets
+from .. import faces, kept_analysis, last_result, preferences, properties, running, targets
 from ..panel import panel_settings
 from ..run import Run
+from . import again
 from .with_progress import WithProgress, redraw
 
 
@@ -36,7 +37,8 @@ class UV_OT_ble_unwrap(WithProgress, bpy.types.Operator):
         return True
 
     def invoke(self, context, _event):
-        properties.copy_unset(self.properties, context.scene.ble_unwrap)
+        if not again.is_invoked():
+            properties.copy_unset(self.properties, context.scene.ble_unwrap)
         self.from_sidebar = True
         return self.compute(context, in_background=not bpy.app.background)
 
@@ -45,6 +47,9 @@ class UV_OT_ble_unwrap(WithProgress, bpy.types.Operator):
 
     def draw(self, context):
         layout = self.layout
+        if running.is_there():
+            running.draw(layout)
+            return
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()

@@ -1,6 +1,9 @@
 """What operators have in common that compute for long: a job on another thread, its progress, and Esc."""
 
-from .. import engine, mesh_bridge, preferences
+import bpy
+
+from .. import engine, mesh_bridge, preferences, running
+from . import again
 
 # The add-on's failures that are the user's business; anything else is a bug and may show its traceback.
 USER_ERRORS = (mesh_bridge.MeshError, engine.EngineMissing, engine.EngineError)
@@ -30,26 +33,37 @@ class WithProgress:
     Whenever either raises one of `USER_ERRORS`, nothing has been changed.
     """
 
+    _replaces = False  # whether this is a run in the place of a former one, from the redo panel
+
     def compute(self, context, *, in_background):
         """Everything from reading to writing; `in_background` where the work is large and there are events to wait for.
 
         Returns what the operator returns.
         """
+        self._replaces = again.is_invoked()
         try:
             work = self._prepare(context)
-            if not in_background or work.element_count < preferences.preference(context, "modal_threshold"):
+            is_large = work.element_count >= preferences.preference(context, "modal_threshold")
+            if is_large and not in_background and self._is_redone():
+                again.ask(self)
+                return {"CANCELLED"}
+            if not in_background or not is_large:
                 return self._finish(context, work, work.run())
             self._start(context, work)
         except USER_ERRORS as error:
             return self._fail(error)
         return {"RUNNING_MODAL"}
 
+    def _is_redone(self):
+        """Whether the redo panel runs it: only what was invoked before has been told to keep the sidebar's settings."""
+        return not bpy.app.background and getattr(self, "from_sidebar", False)
+
     def modal(self, context, event):
         if event.type == "ESC" and event.value == "PRESS":
-            self._cancel_requested = True
-            self._job.cancel()
+            running.stop()
         if event.type != "TIMER":
-            return {"PASS_THROUGH"} if event.type in PASSED_EVENTS else {"RUNNING_MODAL"}
+            passed = event.type in PASSED_EVENTS or (event.type == "LEFTMOUSE" and _is_on_button(context, event))
+            return {"PASS_THROUGH"} if passed else {"RUNNING_MODAL"}
         if self._cancel_requested:
             self._cancel_polls += 1
             if self._job.is_finished() or self._cancel_polls > CANCEL_POLLS:
@@ -70,7 +84,7 @@ class WithProgress:
 
     def cancel(self, context):
         """Blender itself ends the operator: a file is loaded or the window closes."""
-        self._job.cancel()
+        self._ask_to_stop()
         self._stop(context)
 
     def _start(self, context, work):
@@ -78,29 +92,55 @@ class WithProgress:
         self._job = work.start()
         self._cancel_requested = False
         self._cancel_polls = 0
+        running.begin(self._ask_to_stop)
         manager = context.window_manager
         self._timer = manager.event_timer_add(POLL_SECONDS, window=context.window)
         manager.modal_handler_add(self)
         manager.progress_begin(0, 100)
         self._show_progress(context)
 
+    def _ask_to_stop(self):
+        self._cancel_requested = True
+        self._job.cancel()
+
     def _show_progress(self, context):
-        percent = int(100 * self._job.progress())
-        context.window_manager.progress_update(percent)
-        context.workspace.status_text_set(f"{self.bl_label}: {percent}%  {self._job.stage()}    [Esc] cancel")
+        running.tell(self._job.progress(), self._job.stage())
+        context.window_manager.progress_update(int(100 * running.share()))
+        context.workspace.status_text_set(
+            f"{self.bl_label}: {running.progress_text()}    {running.time_text()}    [Esc] cancel"
+        )
 
     def _stop(self, context):
+        running.end()
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
         context.workspace.status_text_set(None)
 
     def _cancelled(self):
+        if self._replaces:
+            again.bring_back()
         self.report({"WARNING"}, f"{self.bl_label}: cancelled, nothing was changed")
         return {"CANCELLED"}
 
     def _fail(self, error):
+        if self._replaces:
+            again.bring_back()
         self.report({"ERROR"}, f"{self.bl_label}: {error}")
         return {"CANCELLED"}
+
+
+def _is_on_button(context, event):
+    """Whether the pointer is on a button that runs an operator where the computation is shown: the only such is Cancel.
+
+    All others are greyed out meanwhile, and beside the buttons a click would select what lies behind the sidebar.
+    """
+    for area, region in running.regions(context.window):
+        x, y = event.mouse_x - region.x, event.mouse_y - region.y
+        if 0 <= x < region.width and 0 <= y < region.height:
+            with context.temp_override(area=area, region=region):
+                # There is no other way to ask Blender what the pointer is on.
+                return bpy.ops.ui.copy_python_command_button.poll()
+    return False
 
 
 def redraw(context):
