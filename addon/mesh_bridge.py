@@ -1,8 +1,8 @@
 """Blender's meshes to flat arrays, and UVs back; cloud_bridge.py builds upon it for points without faces.
 
-What can crosses in bulk (`foreach_get`, `foreach_set`); what Blender keeps for edit mode alone is asked for element by
-element. Reading changes nothing. Writing happens in one go at the end, and only on meshes that are still as they were
-read.
+Arrays cross in bulk (`foreach_get`, `foreach_set`), in edit mode from a copy of the mesh; what Blender keeps for edit
+mode alone is asked for element by element. Reading changes nothing. Writing happens in one go at the end, and only on
+meshes that are still as they were read.
 """
 
 import hashlib
@@ -16,9 +16,13 @@ from .faces import chosen_faces
 from .mesh_arrays import (
     MeshError,
     NothingToUnwrap,
+    in_bulk,
     object_mode,
     read_array,
+    read_corner_edges,
     read_corner_vertices,
+    read_edge_flags,
+    read_edge_vertices,
     read_face_offsets,
     read_positions,
     renumber,
@@ -54,7 +58,7 @@ class Selection:
     corner_vertices: np.ndarray  # (c,) int32
     face_offsets: np.ndarray  # (f + 1,) int32
     corner_triangles: np.ndarray | None  # (t, 3) int32 corners; None: only triangles
-    marks: dict[str, np.ndarray]  # of each kind in MARKS the edges that have it, (m, 2) int32 vertices
+    marks: dict[str, np.ndarray]  # of each kind in MARKS the edges that have it, (m, 2) int32 vertices; empty: not read
     seam_weights: np.ndarray | None  # (n,) float32, what a seam at each vertex counts for; None: its length everywhere
     warnings: list[str] = field(default_factory=list)
 
@@ -89,6 +93,7 @@ def gather(
     only_selected=False,
     by_uv=False,
     whole=False,
+    marks=True,
     target=ACTIVE_MAP,
     move_pinned=True,
     sharp_angle=ONLY_MARKED,
@@ -98,7 +103,8 @@ def gather(
     """Reads the objects' base meshes (before modifiers and shape keys) as one `Selection`.
 
     `only_selected` and `by_uv` as in `chosen_faces`; they matter for objects in edit mode. With `whole` all faces are
-    read, in edit mode hidden ones, too. `target` is the UV map that will be written, or None where none will be;
+    read, in edit mode hidden ones, too; without `marks` no marked edges are, which islands that are there have no use
+    for. `target` is the UV map that will be written, or None where none will be;
     `sharp_angle` is in degrees, `seams_away` and `seams_here` name what is painted (`painted`). Raises
     `MeshError` where the map cannot be written, or where pinned UVs would be moved and may not be.
     """
@@ -117,7 +123,8 @@ def gather(
         except NothingToUnwrap as error:
             reasons.append(error)
             continue
-        block = read_mesh(mesh, chosen, sharp_angle)
+        with in_bulk(mesh) as readable:
+            block = read_mesh(readable, chosen, sharp_angle if marks else None)
         if not move_pinned:
             uv_maps.check_pins(obj, target, block["source_corners"])
         weights, names = painted.seam_weights(obj, seams_away, seams_here)
@@ -146,7 +153,7 @@ def gather(
                 block["face_sizes"],
                 block["triangles"] + corner_base,
                 weights if block["source_vertices"] is None else weights[block["source_vertices"]],
-                *(block["marks"][kind] + vertex_base for kind in MARKS),
+                *(edges + vertex_base for edges in block["marks"].values()),
             )
         )
         vertex_base += len(positions)
@@ -159,7 +166,7 @@ def gather(
     if missing := [name for name in dict.fromkeys((seams_away, seams_here)) if name and name not in found]:
         names = " or ".join(f'"{name}"' for name in missing)
         warnings.append(f"There is no vertex group and no float attribute on points named {names}")
-    positions, corner_vertices, sizes, triangles, weights, *marks = (
+    positions, corner_vertices, sizes, triangles, weights, *marked = (
         np.concatenate(column) for column in zip(*blocks, strict=True)
     )
     offsets = np.zeros(len(sizes) + 1, np.int32)
@@ -171,18 +178,24 @@ def gather(
         face_offsets=offsets,
         corner_triangles=None if (sizes == 3).all() else np.ascontiguousarray(triangles, np.int32),
         seam_weights=np.ascontiguousarray(weights, np.float32) if found else None,
-        marks={kind: np.ascontiguousarray(edges, np.int32) for kind, edges in zip(MARKS, marks, strict=True)},
+        marks={
+            kind: np.ascontiguousarray(edges, np.int32)
+            for kind, edges in zip(MARKS if marks else (), marked, strict=True)
+        },
         warnings=warnings,
     )
 
 
-def read_mesh(mesh, chosen, sharp_angle=ONLY_MARKED):
-    """Arrays of one mesh, compacted to the chosen faces, (f,) bool; None: all."""
+def read_mesh(mesh, chosen, sharp_angle=None):
+    """Arrays of one mesh that is `in_bulk`, compacted to the chosen faces, (f,) bool; None: all.
+
+    Without a `sharp_angle` marked edges are not read.
+    """
     positions = read_positions(mesh)
     corner_vertices = read_corner_vertices(mesh)
     offsets = read_face_offsets(mesh)
     sizes = np.diff(offsets)
-    marks = read_marks(mesh, sizes, sharp_angle)
+    marks = {} if sharp_angle is None else read_marks(mesh, sizes, sharp_angle)
     mesh.calc_loop_triangles()
     triangles = read_array(mesh.loop_triangles, "loops", np.int32, 3)
     source_faces = source_corners = source_vertices = None
@@ -215,9 +228,9 @@ def read_mesh(mesh, chosen, sharp_angle=ONLY_MARKED):
 
 def read_marks(mesh, face_sizes, sharp_angle):
     """The edges of each kind in `MARKS` as pairs of vertices: the artist's seams, sharp edges, borders of materials."""
-    edges = read_array(mesh.edges, "vertices", np.int32, 2)
-    corner_edges = read_array(mesh.loops, "edge_index", np.int32)
-    sharp = read_array(mesh.edges, "use_edge_sharp", bool)
+    edges = read_edge_vertices(mesh)
+    corner_edges = read_corner_edges(mesh)
+    sharp = read_edge_flags(mesh, "use_edge_sharp")
     if sharp_angle < ONLY_MARKED:
         sharp = sharp | bends(mesh, corner_edges, face_sizes, sharp_angle)
     border = np.zeros(len(edges), bool)
@@ -271,8 +284,9 @@ def fingerprint(mesh):
     """Digest of a mesh's faces and corners: equal as long as UVs by corner still fit."""
     digest = hashlib.blake2b(digest_size=16)
     digest.update(np.array([len(mesh.vertices), len(mesh.polygons), len(mesh.loops)], np.int64).tobytes())
-    digest.update(read_face_offsets(mesh).tobytes())
-    digest.update(read_corner_vertices(mesh).tobytes())
+    with in_bulk(mesh) as readable:
+        digest.update(read_face_offsets(readable))
+        digest.update(read_corner_vertices(readable))
     return digest.digest()
 
 
@@ -375,7 +389,8 @@ def kept_faces(selection, held):
         kept[part.source_faces] = False
         if not kept.any():
             continue
-        block = read_mesh(mesh, kept)
+        with in_bulk(mesh) as readable:
+            block = read_mesh(readable, kept)
         columns.append(
             (
                 block["positions"],
@@ -410,9 +425,5 @@ def read_uvs(selection, target=ACTIVE_MAP):
     ]
     if not all(there for _, there in maps):
         return None
-    with object_mode(meshes):
-        held = [
-            read_array(mesh.uv_layers[name].uv, "vector", np.float32, 2)
-            for mesh, (name, _) in zip(meshes, maps, strict=True)
-        ]
+    held = [uv_maps.read_map(mesh, name) for mesh, (name, _) in zip(meshes, maps, strict=True)]
     return of_selection(selection, held)

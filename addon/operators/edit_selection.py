@@ -4,7 +4,7 @@ import bmesh
 import bpy
 import numpy as np
 
-from ..mesh_arrays import read_array
+from ..mesh_arrays import read_face_flags
 
 
 def leave_edit_mode(context):
@@ -35,7 +35,7 @@ def select_elements(context, found, kind):
 
 def visible_faces(mesh, faces):
     """Those of the faces, by number, that are there and that edit mode would show."""
-    hidden = read_array(mesh.polygons, "hide", bool)
+    hidden = read_face_flags(mesh, "hide")
     faces = np.array(faces, np.int64)
     faces = faces[faces < len(hidden)]
     return faces[~hidden[faces]]

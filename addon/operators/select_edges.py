@@ -5,7 +5,7 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from .. import last_result
-from ..mesh_arrays import crowded_edges, opposed_edges, read_array
+from ..mesh_arrays import crowded_edges, opposed_edges, read_edge_flags
 from .edit_selection import leave_edit_mode, select_elements
 
 EDGES = {"CROWDED": crowded_edges, "OPPOSED": opposed_edges}
@@ -58,7 +58,7 @@ class MESH_OT_ble_unwrap_select_edges(bpy.types.Operator):
 
 def visible_edges(mesh, is_meant):
     """Indices of the edges that are meant and that edit mode would show."""
-    return np.flatnonzero(is_meant(mesh) & ~read_array(mesh.edges, "hide", bool))
+    return np.flatnonzero(is_meant(mesh) & ~read_edge_flags(mesh, "hide"))
 
 
 def register():
