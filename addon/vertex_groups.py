@@ -30,9 +30,7 @@ def weights(obj, name):
         copy = temporary(bpy.data.objects, bpy.data.objects.new(GROUP, mesh))
         scene = temporary(bpy.data.scenes, bpy.data.scenes.new(GROUP))
         tree = temporary(bpy.data.node_groups, bpy.data.node_groups.new(GROUP, "GeometryNodeTree"))
-        if keys := mesh.shape_keys:
-            copy.shape_key_clear()
-            bpy.data.batch_remove([keys])  # in Blender 4.2 they outlive the mesh
+        _remove_shape_keys(copy)
         scene.collection.objects.link(copy)
         group = copy.vertex_groups[name]
         group.name = GROUP
@@ -42,6 +40,16 @@ def weights(obj, name):
         layer.update()
         evaluated = copy.evaluated_get(layer.depsgraph).data
         return read_array(evaluated.attributes[COPIED].data, "value", np.float32)
+
+
+def _remove_shape_keys(obj):
+    """Removes the shape keys of an object's mesh, which in some versions of Blender outlive it."""
+    if obj.data.shape_keys is None:
+        return
+    uid = obj.data.shape_keys.session_uid
+    obj.shape_key_clear()
+    # Looked for anew: in other versions they are freed by now.
+    bpy.data.batch_remove([keys for keys in bpy.data.shape_keys if keys.session_uid == uid])
 
 
 def _copy_group(tree, group):
