@@ -31,6 +31,8 @@ from .mesh_arrays import (
 MARKS = ("seams", "sharp", "materials")  # what an artist marks edges by
 ONLY_MARKED = 180.0  # degrees; no edge is sharper, so that only those that are marked sharp are
 ACTIVE_MAP = uv_maps.MapChoice()
+# Of the square of a face's length: a face of less area is a line but for what single precision rounds.
+LEAST_AREA = 1e-6
 SCALE_TOLERANCE = 1e-3  # relative difference of an object's axes from which its scale counts as non-uniform
 
 
@@ -124,14 +126,14 @@ def gather(
             reasons.append(error)
             continue
         with in_bulk(mesh) as readable:
-            block = read_mesh(readable, chosen, sharp_angle if marks else None)
+            block = read_mesh(readable, chosen, sharp_angle if marks else None, obj.matrix_world)
         if not move_pinned:
             uv_maps.check_pins(obj, target, block["source_corners"])
         weights, names = painted.seam_weights(obj, seams_away, seams_here)
         found |= names
-        positions, note = scale_as_in_scene(block["positions"], obj.matrix_world)
-        if note:
-            warnings.append(f"{obj.name}: {note}")
+        positions = block["positions"]
+        if block["note"]:
+            warnings.append(f"{obj.name}: {block['note']}")
         corner_count, face_count = len(block["corner_vertices"]), len(block["face_sizes"])
         parts.append(
             MeshPart(
@@ -186,16 +188,19 @@ def gather(
     )
 
 
-def read_mesh(mesh, chosen, sharp_angle=None):
+def read_mesh(mesh, chosen, sharp_angle=None, matrix_world=None):
     """Arrays of one mesh that is `in_bulk`, compacted to the chosen faces, (f,) bool; None: all.
 
-    Without a `sharp_angle` marked edges are not read.
+    With a `matrix_world` the mesh is as large as it is in the scene, and a `note` may say what came of that. Without a
+    `sharp_angle` marked edges are not read.
     """
-    positions = read_positions(mesh)
+    positions, note = read_positions(mesh), None
+    if matrix_world is not None:
+        positions, note = scale_as_in_scene(positions, matrix_world)
     corner_vertices = read_corner_vertices(mesh)
     offsets = read_face_offsets(mesh)
     sizes = np.diff(offsets)
-    marks = {} if sharp_angle is None else read_marks(mesh, sizes, sharp_angle)
+    marks = {} if sharp_angle is None else read_marks(mesh, positions, corner_vertices, offsets, sharp_angle)
     mesh.calc_loop_triangles()
     triangles = read_array(mesh.loop_triangles, "loops", np.int32, 3)
     source_faces = source_corners = source_vertices = None
@@ -216,6 +221,7 @@ def read_mesh(mesh, chosen, sharp_angle=None):
         sizes = sizes[source_faces]
     return {
         "positions": positions,
+        "note": note,
         "corner_vertices": corner_vertices,
         "face_sizes": sizes,
         "triangles": triangles,
@@ -226,37 +232,53 @@ def read_mesh(mesh, chosen, sharp_angle=None):
     }
 
 
-def read_marks(mesh, face_sizes, sharp_angle):
-    """The edges of each kind in `MARKS` as pairs of vertices: the artist's seams, sharp edges, borders of materials."""
+def read_marks(mesh, positions, corner_vertices, offsets, sharp_angle):
+    """The edges of each kind in `MARKS` as pairs of vertices: the artist's seams, sharp edges, borders of materials.
+
+    Angles are those between faces at these positions.
+    """
     edges = read_edge_vertices(mesh)
     corner_edges = read_corner_edges(mesh)
     sharp = read_edge_flags(mesh, "use_edge_sharp")
     if sharp_angle < ONLY_MARKED:
-        sharp = sharp | bends(mesh, corner_edges, face_sizes, sharp_angle)
+        sharp = sharp | bends(positions, corner_vertices, offsets, corner_edges, len(edges), sharp_angle)
     border = np.zeros(len(edges), bool)
     if len(mesh.materials) > 1:
-        material = np.repeat(read_array(mesh.polygons, "material_index", np.int32), face_sizes)
+        material = np.repeat(read_array(mesh.polygons, "material_index", np.int32), np.diff(offsets))
         any_of = np.zeros(len(edges), np.int32)
         any_of[corner_edges] = material
         border[corner_edges[material != any_of[corner_edges]]] = True
     return {"seams": edges[seams.wished_seams(mesh)], "sharp": edges[sharp], "materials": edges[border]}
 
 
-def bends(mesh, corner_edges, face_sizes, least_angle):
+def bends(positions, corner_vertices, offsets, corner_edges, edge_count, least_angle):
     """The edges at which the normals of two faces are at least so many degrees apart, (e,) bool."""
-    normals = read_array(mesh.polygons, "normal", np.float32, 3)
-    areas = read_array(mesh.polygons, "area", np.float32)
-    face = np.repeat(np.arange(len(face_sizes)), face_sizes)
+    normals, known_normal = face_normals(positions, corner_vertices, offsets)
+    face = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     order = np.argsort(corner_edges, kind="stable")
-    of_edge = np.bincount(corner_edges, minlength=len(mesh.edges))
+    of_edge = np.bincount(corner_edges, minlength=edge_count)
     first = np.cumsum(of_edge) - of_edge
     with_two = np.flatnonzero(of_edge == 2)
     one, other = (face[order[first[with_two] + side]] for side in (0, 1))
-    # A face without area has no normal, whatever Blender gives it; the others are known to single precision.
-    known = (areas[one] > 0.0) & (areas[other] > 0.0)
-    bent = np.zeros(len(mesh.edges), bool)
+    # Positions are known to single precision, and with them the angles.
+    known = known_normal[one] & known_normal[other]
+    bent = np.zeros(edge_count, bool)
     bent[with_two] = known & ((normals[one] * normals[other]).sum(axis=1) <= np.cos(np.radians(least_angle)) + 1e-6)
     return bent
+
+
+def face_normals(positions, corner_vertices, offsets):
+    """The unit normal of each face, (f, 3), of n-gons the mean one; and which faces have one, (f,) bool."""
+    starts, sizes = offsets[:-1], np.diff(offsets)
+    following = np.arange(1, len(corner_vertices) + 1)
+    following[offsets[1:] - 1] = starts
+    places = positions[corner_vertices].astype(np.float64)
+    places -= np.repeat(places[starts], sizes, axis=0)
+    with np.errstate(all="ignore"):  # of what is not finite or has no area
+        doubled = np.add.reduceat(np.cross(places, places[following]), starts)
+        length = np.linalg.norm(doubled, axis=1)
+        extent = np.maximum.reduceat((places**2).sum(axis=1), starts)
+        return doubled / length[:, None], length > LEAST_AREA * extent
 
 
 def scale_as_in_scene(positions, matrix_world):
