@@ -4,7 +4,7 @@ import bmesh
 import bpy
 import numpy as np
 
-from .mesh_arrays import NothingToUnwrap, read_array
+from .mesh_arrays import NothingToUnwrap, in_bulk, read_array, read_face_flags, read_face_offsets
 
 
 def chosen_faces(obj, *, only_selected, by_uv=False):
@@ -16,11 +16,13 @@ def chosen_faces(obj, *, only_selected, by_uv=False):
     mesh = obj.data
     if obj.mode != "EDIT":
         return None
-    chosen = ~read_array(mesh.polygons, "hide", bool)
+    with in_bulk(mesh) as readable:
+        hidden, selected = (read_face_flags(readable, name) for name in ("hide", "select"))
+    chosen = ~hidden
     if not chosen.any():
         raise NothingToUnwrap("All faces are hidden")
     if only_selected:
-        chosen &= read_array(mesh.polygons, "select", bool)
+        chosen &= selected
         if not chosen.any():
             raise NothingToUnwrap("No faces are selected")
         if by_uv and mesh.uv_layers:
@@ -38,8 +40,9 @@ def selected_and_hidden(obj, *, by_uv=False):
     mesh = obj.data
     if obj.mode != "EDIT":
         return np.ones(len(mesh.polygons), bool), np.zeros(len(mesh.polygons), bool)
-    hidden = read_array(mesh.polygons, "hide", bool)
-    selected = read_array(mesh.polygons, "select", bool) & ~hidden
+    with in_bulk(mesh) as readable:
+        hidden, selected = (read_face_flags(readable, name) for name in ("hide", "select"))
+    selected &= ~hidden
     return (selected & uv_selected_faces(mesh) if by_uv and mesh.uv_layers else selected), hidden
 
 
@@ -55,14 +58,18 @@ def by_uv_selection(context):
 
 
 def uv_selected_faces(mesh):
-    """Faces whose UVs are selected in the active map, (f,) bool, as the UV Editor shows them; of a mesh in edit mode.
+    """Faces whose UVs are selected in the active map, (f,) bool, as the UV Editor shows them.
 
-    Of a face all corners are, or in the UV Editor's edge mode all sides, which is Blender's own rule.
+    The mesh is in edit mode and up to date. Of a face all corners are, or in the UV Editor's edge mode all sides, which
+    is Blender's own rule.
     """
-    edit_mesh = bmesh.from_edit_mesh(mesh)
-    faces = edit_mesh.faces
     if hasattr(bmesh.types.BMFace, "uv_select"):  # 5.0 and later
+        faces = bmesh.from_edit_mesh(mesh).faces
         return np.fromiter((face.uv_select for face in faces), bool, len(faces))
-    layer = edit_mesh.loops.layers.uv.active
-    flag = "select_edge" if bpy.context.scene.tool_settings.uv_select_mode == "EDGE" else "select"
-    return np.fromiter((all(getattr(loop[layer], flag) for loop in face.loops) for face in faces), bool, len(faces))
+    with in_bulk(mesh) as readable:
+        layer = readable.uv_layers.active
+        by_edge = bpy.context.scene.tool_settings.uv_select_mode == "EDGE"
+        corners = layer.edge_selection if by_edge else layer.vertex_selection
+        if not len(corners):
+            return np.zeros(len(readable.polygons), bool)
+        return np.logical_and.reduceat(read_array(corners, "value", bool), read_face_offsets(readable)[:-1])

@@ -34,7 +34,8 @@ class IslandChoice:
         ):
             if which:
                 self.warnings.append(f"{', '.join(obj.name for obj in which)}: {why}")
-        self.selection = mesh_bridge.gather(editable or mapped, whole=True)  # which says so where none is editable
+        # Where no mesh is editable, this says so.
+        self.selection = mesh_bridge.gather(editable or mapped, whole=True, marks=False)
         self.objects = editable
         states = [faces.selected_and_hidden(obj, by_uv=by_uv) for obj in editable]
         self.uv = mesh_bridge.read_uvs(self.selection)

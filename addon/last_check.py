@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from . import map_state
+from . import handlers, map_state
 
 QUIET_SECONDS = 0.4  # after the last change, before meshes are compared: none is read while something is dragged
 # A check that has been in doubt for longer counts as out of date meanwhile. Selecting, changing modes and the check
@@ -180,13 +180,11 @@ HANDLERS = (("depsgraph_update_post", changed), ("undo_post", undone), ("redo_po
 
 
 def register():
-    for event, function in HANDLERS:
-        getattr(bpy.app.handlers, event).append(function)
+    handlers.add(HANDLERS)
 
 
 def unregister():
-    for event, function in HANDLERS:
-        getattr(bpy.app.handlers, event).remove(function)
+    handlers.remove(HANDLERS)
     if bpy.app.timers.is_registered(_settle):
         bpy.app.timers.unregister(_settle)
     clear()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from . import comparison_image, map_state
+from . import comparison_image, handlers, map_state
 
 
 @dataclass(frozen=True)
@@ -85,11 +85,9 @@ HANDLERS = (("undo_post", undone), ("redo_post", undone), ("load_post", forget))
 
 
 def register():
-    for event, function in HANDLERS:
-        getattr(bpy.app.handlers, event).append(function)
+    handlers.add(HANDLERS)
 
 
 def unregister():
-    for event, function in HANDLERS:
-        getattr(bpy.app.handlers, event).remove(function)
+    handlers.remove(HANDLERS)
     forget()

@@ -9,6 +9,7 @@ import json
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
+from . import handlers
 from .map_state import corner_count, find, uv_digest
 from .mesh_arrays import crowded_edges, opposed_edges
 
@@ -105,12 +106,10 @@ HANDLERS = (("undo_post", compare), ("redo_post", compare), ("load_post", forget
 def register():
     bpy.utils.register_class(BLEUnwrapCertificate)
     bpy.types.WindowManager.ble_unwrap_certificate = bpy.props.PointerProperty(type=BLEUnwrapCertificate)
-    for event, function in HANDLERS:
-        getattr(bpy.app.handlers, event).append(function)
+    handlers.add(HANDLERS)
 
 
 def unregister():
-    for event, function in HANDLERS:
-        getattr(bpy.app.handlers, event).remove(function)
+    handlers.remove(HANDLERS)
     del bpy.types.WindowManager.ble_unwrap_certificate
     bpy.utils.unregister_class(BLEUnwrapCertificate)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import check_report, map_state, measurement, mesh_bridge, textures, triangle_shapes, units, uv_islands
+from . import check_report, measurement, mesh_bridge, textures, triangle_shapes, units, uv_islands, uv_maps
 from .island_choice import part_of_face
 from .mesh_arrays import MeshError
 from .triangle_shapes import Shapes
@@ -37,10 +37,10 @@ def check(objects, settings, *, threads=0):
     mapped = [obj for obj in objects if obj.type == "MESH" and obj.data.polygons and obj.data.uv_layers.active]
     if not mapped:
         raise MeshError("There is no UV map to check")
-    selection = mesh_bridge.gather(mapped, whole=True, target=None)
+    selection = mesh_bridge.gather(mapped, whole=True, marks=False, target=None)
     maps = mesh_bridge.active_maps(selection)
     # Edit mode is not left for it: a check is no step of Blender's undo.
-    uv = np.concatenate([map_state.read_uv(obj, name) for obj, name in zip(mapped, maps, strict=True)])
+    uv = np.concatenate([uv_maps.read_map(obj.data, name) for obj, name in zip(mapped, maps, strict=True)])
     size = settings["texture_size"]
     if settings["correct_aspect"]:
         size, _ = textures.proportioned_size(mapped, maps, size)

@@ -1,8 +1,8 @@
 """Blender's meshes to flat arrays, and UVs back; cloud_bridge.py builds upon it for points without faces.
 
-What can crosses in bulk (`foreach_get`, `foreach_set`); what Blender keeps for edit mode alone is asked for element by
-element. Reading changes nothing. Writing happens in one go at the end, and only on meshes that are still as they were
-read.
+Arrays cross in bulk (`foreach_get`, `foreach_set`), in edit mode from a copy of the mesh; what Blender keeps for edit
+mode alone is asked for element by element. Reading changes nothing. Writing happens in one go at the end, and only on
+meshes that are still as they were read.
 """
 
 import hashlib
@@ -16,9 +16,13 @@ from .faces import chosen_faces
 from .mesh_arrays import (
     MeshError,
     NothingToUnwrap,
+    in_bulk,
     object_mode,
     read_array,
+    read_corner_edges,
     read_corner_vertices,
+    read_edge_flags,
+    read_edge_vertices,
     read_face_offsets,
     read_positions,
     renumber,
@@ -27,6 +31,8 @@ from .mesh_arrays import (
 MARKS = ("seams", "sharp", "materials")  # what an artist marks edges by
 ONLY_MARKED = 180.0  # degrees; no edge is sharper, so that only those that are marked sharp are
 ACTIVE_MAP = uv_maps.MapChoice()
+# Of the square of a face's length: a face of less area is a line but for what single precision rounds.
+LEAST_AREA = 1e-6
 SCALE_TOLERANCE = 1e-3  # relative difference of an object's axes from which its scale counts as non-uniform
 
 
@@ -54,7 +60,7 @@ class Selection:
     corner_vertices: np.ndarray  # (c,) int32
     face_offsets: np.ndarray  # (f + 1,) int32
     corner_triangles: np.ndarray | None  # (t, 3) int32 corners; None: only triangles
-    marks: dict[str, np.ndarray]  # of each kind in MARKS the edges that have it, (m, 2) int32 vertices
+    marks: dict[str, np.ndarray]  # of each kind in MARKS the edges that have it, (m, 2) int32 vertices; empty: not read
     seam_weights: np.ndarray | None  # (n,) float32, what a seam at each vertex counts for; None: its length everywhere
     warnings: list[str] = field(default_factory=list)
 
@@ -89,6 +95,7 @@ def gather(
     only_selected=False,
     by_uv=False,
     whole=False,
+    marks=True,
     target=ACTIVE_MAP,
     move_pinned=True,
     sharp_angle=ONLY_MARKED,
@@ -98,7 +105,8 @@ def gather(
     """Reads the objects' base meshes (before modifiers and shape keys) as one `Selection`.
 
     `only_selected` and `by_uv` as in `chosen_faces`; they matter for objects in edit mode. With `whole` all faces are
-    read, in edit mode hidden ones, too. `target` is the UV map that will be written, or None where none will be;
+    read, in edit mode hidden ones, too; without `marks` no marked edges are, which islands that are there have no use
+    for. `target` is the UV map that will be written, or None where none will be;
     `sharp_angle` is in degrees, `seams_away` and `seams_here` name what is painted (`painted`). Raises
     `MeshError` where the map cannot be written, or where pinned UVs would be moved and may not be.
     """
@@ -117,14 +125,15 @@ def gather(
         except NothingToUnwrap as error:
             reasons.append(error)
             continue
-        block = read_mesh(mesh, chosen, sharp_angle)
+        with in_bulk(mesh) as readable:
+            block = read_mesh(readable, chosen, sharp_angle if marks else None, obj.matrix_world)
         if not move_pinned:
             uv_maps.check_pins(obj, target, block["source_corners"])
         weights, names = painted.seam_weights(obj, seams_away, seams_here)
         found |= names
-        positions, note = scale_as_in_scene(block["positions"], obj.matrix_world)
-        if note:
-            warnings.append(f"{obj.name}: {note}")
+        positions = block["positions"]
+        if block["note"]:
+            warnings.append(f"{obj.name}: {block['note']}")
         corner_count, face_count = len(block["corner_vertices"]), len(block["face_sizes"])
         parts.append(
             MeshPart(
@@ -146,7 +155,7 @@ def gather(
                 block["face_sizes"],
                 block["triangles"] + corner_base,
                 weights if block["source_vertices"] is None else weights[block["source_vertices"]],
-                *(block["marks"][kind] + vertex_base for kind in MARKS),
+                *(edges + vertex_base for edges in block["marks"].values()),
             )
         )
         vertex_base += len(positions)
@@ -159,7 +168,7 @@ def gather(
     if missing := [name for name in dict.fromkeys((seams_away, seams_here)) if name and name not in found]:
         names = " or ".join(f'"{name}"' for name in missing)
         warnings.append(f"There is no vertex group and no float attribute on points named {names}")
-    positions, corner_vertices, sizes, triangles, weights, *marks = (
+    positions, corner_vertices, sizes, triangles, weights, *marked = (
         np.concatenate(column) for column in zip(*blocks, strict=True)
     )
     offsets = np.zeros(len(sizes) + 1, np.int32)
@@ -171,18 +180,27 @@ def gather(
         face_offsets=offsets,
         corner_triangles=None if (sizes == 3).all() else np.ascontiguousarray(triangles, np.int32),
         seam_weights=np.ascontiguousarray(weights, np.float32) if found else None,
-        marks={kind: np.ascontiguousarray(edges, np.int32) for kind, edges in zip(MARKS, marks, strict=True)},
+        marks={
+            kind: np.ascontiguousarray(edges, np.int32)
+            for kind, edges in zip(MARKS if marks else (), marked, strict=True)
+        },
         warnings=warnings,
     )
 
 
-def read_mesh(mesh, chosen, sharp_angle=ONLY_MARKED):
-    """Arrays of one mesh, compacted to the chosen faces, (f,) bool; None: all."""
-    positions = read_positions(mesh)
+def read_mesh(mesh, chosen, sharp_angle=None, matrix_world=None):
+    """Arrays of one mesh that is `in_bulk`, compacted to the chosen faces, (f,) bool; None: all.
+
+    With a `matrix_world` the mesh is as large as it is in the scene, and a `note` may say what came of that. Without a
+    `sharp_angle` marked edges are not read.
+    """
+    positions, note = read_positions(mesh), None
+    if matrix_world is not None:
+        positions, note = scale_as_in_scene(positions, matrix_world)
     corner_vertices = read_corner_vertices(mesh)
     offsets = read_face_offsets(mesh)
     sizes = np.diff(offsets)
-    marks = read_marks(mesh, sizes, sharp_angle)
+    marks = {} if sharp_angle is None else read_marks(mesh, positions, corner_vertices, offsets, sharp_angle)
     mesh.calc_loop_triangles()
     triangles = read_array(mesh.loop_triangles, "loops", np.int32, 3)
     source_faces = source_corners = source_vertices = None
@@ -203,6 +221,7 @@ def read_mesh(mesh, chosen, sharp_angle=ONLY_MARKED):
         sizes = sizes[source_faces]
     return {
         "positions": positions,
+        "note": note,
         "corner_vertices": corner_vertices,
         "face_sizes": sizes,
         "triangles": triangles,
@@ -213,37 +232,53 @@ def read_mesh(mesh, chosen, sharp_angle=ONLY_MARKED):
     }
 
 
-def read_marks(mesh, face_sizes, sharp_angle):
-    """The edges of each kind in `MARKS` as pairs of vertices: the artist's seams, sharp edges, borders of materials."""
-    edges = read_array(mesh.edges, "vertices", np.int32, 2)
-    corner_edges = read_array(mesh.loops, "edge_index", np.int32)
-    sharp = read_array(mesh.edges, "use_edge_sharp", bool)
+def read_marks(mesh, positions, corner_vertices, offsets, sharp_angle):
+    """The edges of each kind in `MARKS` as pairs of vertices: the artist's seams, sharp edges, borders of materials.
+
+    Angles are those between faces at these positions.
+    """
+    edges = read_edge_vertices(mesh)
+    corner_edges = read_corner_edges(mesh)
+    sharp = read_edge_flags(mesh, "use_edge_sharp")
     if sharp_angle < ONLY_MARKED:
-        sharp = sharp | bends(mesh, corner_edges, face_sizes, sharp_angle)
+        sharp = sharp | bends(positions, corner_vertices, offsets, corner_edges, len(edges), sharp_angle)
     border = np.zeros(len(edges), bool)
     if len(mesh.materials) > 1:
-        material = np.repeat(read_array(mesh.polygons, "material_index", np.int32), face_sizes)
+        material = np.repeat(read_array(mesh.polygons, "material_index", np.int32), np.diff(offsets))
         any_of = np.zeros(len(edges), np.int32)
         any_of[corner_edges] = material
         border[corner_edges[material != any_of[corner_edges]]] = True
     return {"seams": edges[seams.wished_seams(mesh)], "sharp": edges[sharp], "materials": edges[border]}
 
 
-def bends(mesh, corner_edges, face_sizes, least_angle):
+def bends(positions, corner_vertices, offsets, corner_edges, edge_count, least_angle):
     """The edges at which the normals of two faces are at least so many degrees apart, (e,) bool."""
-    normals = read_array(mesh.polygons, "normal", np.float32, 3)
-    areas = read_array(mesh.polygons, "area", np.float32)
-    face = np.repeat(np.arange(len(face_sizes)), face_sizes)
+    normals, known_normal = face_normals(positions, corner_vertices, offsets)
+    face = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     order = np.argsort(corner_edges, kind="stable")
-    of_edge = np.bincount(corner_edges, minlength=len(mesh.edges))
+    of_edge = np.bincount(corner_edges, minlength=edge_count)
     first = np.cumsum(of_edge) - of_edge
     with_two = np.flatnonzero(of_edge == 2)
     one, other = (face[order[first[with_two] + side]] for side in (0, 1))
-    # A face without area has no normal, whatever Blender gives it; the others are known to single precision.
-    known = (areas[one] > 0.0) & (areas[other] > 0.0)
-    bent = np.zeros(len(mesh.edges), bool)
+    # Positions are known to single precision, and with them the angles.
+    known = known_normal[one] & known_normal[other]
+    bent = np.zeros(edge_count, bool)
     bent[with_two] = known & ((normals[one] * normals[other]).sum(axis=1) <= np.cos(np.radians(least_angle)) + 1e-6)
     return bent
+
+
+def face_normals(positions, corner_vertices, offsets):
+    """The unit normal of each face, (f, 3), of n-gons the mean one; and which faces have one, (f,) bool."""
+    starts, sizes = offsets[:-1], np.diff(offsets)
+    following = np.arange(1, len(corner_vertices) + 1)
+    following[offsets[1:] - 1] = starts
+    places = positions[corner_vertices].astype(np.float64)
+    places -= np.repeat(places[starts], sizes, axis=0)
+    with np.errstate(all="ignore"):  # of what is not finite or has no area
+        doubled = np.add.reduceat(np.cross(places, places[following]), starts)
+        length = np.linalg.norm(doubled, axis=1)
+        extent = np.maximum.reduceat((places**2).sum(axis=1), starts)
+        return doubled / length[:, None], length > LEAST_AREA * extent
 
 
 def scale_as_in_scene(positions, matrix_world):
@@ -271,8 +306,9 @@ def fingerprint(mesh):
     """Digest of a mesh's faces and corners: equal as long as UVs by corner still fit."""
     digest = hashlib.blake2b(digest_size=16)
     digest.update(np.array([len(mesh.vertices), len(mesh.polygons), len(mesh.loops)], np.int64).tobytes())
-    digest.update(read_face_offsets(mesh).tobytes())
-    digest.update(read_corner_vertices(mesh).tobytes())
+    with in_bulk(mesh) as readable:
+        digest.update(read_face_offsets(readable))
+        digest.update(read_corner_vertices(readable))
     return digest.digest()
 
 
@@ -375,7 +411,8 @@ def kept_faces(selection, held):
         kept[part.source_faces] = False
         if not kept.any():
             continue
-        block = read_mesh(mesh, kept)
+        with in_bulk(mesh) as readable:
+            block = read_mesh(readable, kept)
         columns.append(
             (
                 block["positions"],
@@ -410,9 +447,5 @@ def read_uvs(selection, target=ACTIVE_MAP):
     ]
     if not all(there for _, there in maps):
         return None
-    with object_mode(meshes):
-        held = [
-            read_array(mesh.uv_layers[name].uv, "vector", np.float32, 2)
-            for mesh, (name, _) in zip(meshes, maps, strict=True)
-        ]
+    held = [uv_maps.read_map(mesh, name) for mesh, (name, _) in zip(meshes, maps, strict=True)]
     return of_selection(selection, held)

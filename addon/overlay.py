@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from . import map_state, overlay_mesh, textures
+from . import handlers, map_state, overlay_mesh, textures
 from .mesh_arrays import MeshError
 
 FILLS = ("CHECKER", "STRETCH", "ISLANDS")  # one of them is shown at a time
@@ -295,11 +295,9 @@ HANDLERS = (("depsgraph_update_post", changed), ("undo_post", undone), ("redo_po
 
 
 def register():
-    for event, function in HANDLERS:
-        getattr(bpy.app.handlers, event).append(function)
+    handlers.add(HANDLERS)
 
 
 def unregister():
-    for event, function in HANDLERS:
-        getattr(bpy.app.handlers, event).remove(function)
+    handlers.remove(HANDLERS)
     turn_off()

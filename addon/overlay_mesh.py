@@ -9,7 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import overlay_colours, seams, uv_islands
-from .mesh_arrays import read_array, read_corner_vertices, read_face_offsets, read_positions
+from .mesh_arrays import (
+    read_array,
+    read_corner_edges,
+    read_corner_vertices,
+    read_edge_vertices,
+    read_face_flags,
+    read_face_offsets,
+    read_positions,
+)
 from .triangle_shapes import Shapes
 
 # UVs that are nearer to each other are one place: modifiers compute those of each face by themselves, and round. It is
@@ -60,13 +68,13 @@ def read(obj, map_name, depsgraph):
         offsets = read_face_offsets(mesh)
         visible = np.ones(len(mesh.polygons), bool)
         if obj.mode == "EDIT":  # in other modes Blender shows all faces
-            visible = ~read_array(mesh.polygons, "hide", bool)
+            visible = ~read_face_flags(mesh, "hide")
         face_of_corner = np.repeat(np.arange(len(visible)), np.diff(offsets))
-        edges = read_array(mesh.edges, "vertices", np.int32, 2)
+        edges = read_edge_vertices(mesh)
         cut = seams.chart_borders(mesh, uv, tolerance=TOLERANCE)
         if not visible.all():
             seen = np.zeros(len(edges), bool)
-            seen[read_array(mesh.loops, "edge_index", np.int32)[visible[face_of_corner]]] = True
+            seen[read_corner_edges(mesh)[visible[face_of_corner]]] = True
             cut &= seen
         return Surface(
             positions=read_positions(mesh),

@@ -1,9 +1,9 @@
 """Where an artist has painted that seams are to keep away, or are welcome."""
 
-import bmesh
 import numpy as np
 
-from .mesh_arrays import read_array
+from . import vertex_groups
+from .mesh_arrays import in_bulk, read_array
 
 FULL_WEIGHT = 10.0  # at full weight a seam counts for so many times its length, or for that share of it
 
@@ -26,24 +26,10 @@ def seam_weights(obj, away, here):
 
 def _values(obj, name):
     """The values of a vertex group or an attribute at each vertex; None where there is none of that name."""
-    mesh = obj.data
-    group = obj.vertex_groups.get(name)
-    if group is not None:
-        values = np.zeros(len(mesh.vertices), np.float32)
-        for vertex in mesh.vertices:
-            for element in vertex.groups:
-                if element.group == group.index:
-                    values[vertex.index] = element.weight
-                    break
-        return values
-    if mesh.is_editmode:
-        vertices = bmesh.from_edit_mesh(mesh).verts
-        layer = vertices.layers.float.get(name)
-        # Where another object edits the mesh, it may have other vertices there.
-        if layer is None or len(vertices) != len(mesh.vertices):
+    if name in obj.vertex_groups:
+        return vertex_groups.weights(obj, name)
+    with in_bulk(obj.data) as mesh:
+        attribute = mesh.attributes.get(name)
+        if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "FLOAT"):
             return None
-        return np.fromiter((v[layer] for v in vertices), np.float32, len(vertices))
-    attribute = mesh.attributes.get(name)
-    if attribute is None or (attribute.domain, attribute.data_type) != ("POINT", "FLOAT"):
-        return None
-    return read_array(attribute.data, "value", np.float32)
+        return read_array(attribute.data, "value", np.float32)

@@ -53,10 +53,13 @@ def panel_settings(settings, context, names):
     return [name for name in names if name not in left_out]
 
 
-class _Main:
-    bl_label = "BLE Unwrap"
+class _InSidebar:
     bl_category = CATEGORY
     bl_region_type = "UI"
+
+
+class _Main(_InSidebar):
+    bl_label = "BLE Unwrap"
 
     def draw(self, context):
         layout = self.layout
@@ -75,10 +78,8 @@ class _Main:
         draw_settings(column, context, ("preset", *properties.MAIN_SETTINGS))
 
 
-class _Certificate:
+class _Certificate(_InSidebar):
     bl_label = "Last Result"
-    bl_category = CATEGORY
-    bl_region_type = "UI"
 
     @classmethod
     def poll(cls, context):
@@ -106,10 +107,8 @@ class _Certificate:
             self.layout.operator("mesh.ble_unwrap_select_narrow", text=text, icon="FACESEL")
 
 
-class _Check:
+class _Check(_InSidebar):
     bl_label = "Check"
-    bl_category = CATEGORY
-    bl_region_type = "UI"
 
     def draw(self, context):
         self.layout.enabled = not running.is_there()
@@ -133,10 +132,8 @@ class _Check:
                 row.operator("mesh.ble_unwrap_select_faulty", text="Select", icon="FACESEL").kind = line.kind
 
 
-class _Show:
+class _Show(_InSidebar):
     bl_label = "Show"
-    bl_category = CATEGORY
-    bl_region_type = "UI"
 
     def draw(self, _context):
         self.layout.enabled = not running.is_there()
@@ -155,10 +152,8 @@ class _Show:
             column.label(text=f"Worst here: {overlay_colours.range_text(*factors)}")
 
 
-class _Compare:
+class _Compare(_InSidebar):
     bl_label = "Compare"
-    bl_category = CATEGORY
-    bl_region_type = "UI"
 
     def draw(self, _context):
         self.layout.enabled = not running.is_there()
@@ -184,10 +179,8 @@ class _Compare:
         layout.operator("uv.ble_unwrap_discard", icon="X")
 
 
-class _Advanced:
+class _Advanced(_InSidebar):
     bl_label = "Advanced"
-    bl_category = CATEGORY
-    bl_region_type = "UI"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
@@ -213,82 +206,36 @@ def wrapped(text):
     return [*lines, line]
 
 
-class IMAGE_PT_ble_unwrap(_Main, bpy.types.Panel):
-    bl_space_type = "IMAGE_EDITOR"
-
-    @classmethod
-    def poll(cls, context):
-        return context.space_data.mode == "UV"
-
-
-class IMAGE_PT_ble_unwrap_certificate(_Certificate, bpy.types.Panel):
-    bl_space_type = "IMAGE_EDITOR"
-    bl_parent_id = "IMAGE_PT_ble_unwrap"
-
-
-class IMAGE_PT_ble_unwrap_check(_Check, bpy.types.Panel):
-    bl_space_type = "IMAGE_EDITOR"
-    bl_parent_id = "IMAGE_PT_ble_unwrap"
-
-
-class IMAGE_PT_ble_unwrap_show(_Show, bpy.types.Panel):
-    bl_space_type = "IMAGE_EDITOR"
-    bl_parent_id = "IMAGE_PT_ble_unwrap"
-
-
-class IMAGE_PT_ble_unwrap_compare(_Compare, bpy.types.Panel):
-    bl_space_type = "IMAGE_EDITOR"
-    bl_parent_id = "IMAGE_PT_ble_unwrap"
-
-
-class IMAGE_PT_ble_unwrap_advanced(_Advanced, bpy.types.Panel):
-    bl_space_type = "IMAGE_EDITOR"
-    bl_parent_id = "IMAGE_PT_ble_unwrap"
-
-
-class VIEW3D_PT_ble_unwrap(_Main, bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-
-
-class VIEW3D_PT_ble_unwrap_certificate(_Certificate, bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_parent_id = "VIEW3D_PT_ble_unwrap"
-
-
-class VIEW3D_PT_ble_unwrap_check(_Check, bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_parent_id = "VIEW3D_PT_ble_unwrap"
-
-
-class VIEW3D_PT_ble_unwrap_show(_Show, bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_parent_id = "VIEW3D_PT_ble_unwrap"
-
-
-class VIEW3D_PT_ble_unwrap_compare(_Compare, bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_parent_id = "VIEW3D_PT_ble_unwrap"
-
-
-class VIEW3D_PT_ble_unwrap_advanced(_Advanced, bpy.types.Panel):
-    bl_space_type = "VIEW_3D"
-    bl_parent_id = "VIEW3D_PT_ble_unwrap"
-
-
-CLASSES = (
-    IMAGE_PT_ble_unwrap,
-    IMAGE_PT_ble_unwrap_certificate,
-    IMAGE_PT_ble_unwrap_check,
-    IMAGE_PT_ble_unwrap_show,
-    IMAGE_PT_ble_unwrap_compare,
-    IMAGE_PT_ble_unwrap_advanced,
-    VIEW3D_PT_ble_unwrap,
-    VIEW3D_PT_ble_unwrap_certificate,
-    VIEW3D_PT_ble_unwrap_check,
-    VIEW3D_PT_ble_unwrap_show,
-    VIEW3D_PT_ble_unwrap_compare,
-    VIEW3D_PT_ble_unwrap_advanced,
+# What the sidebars hold, in this order: the suffix of a panel's name, and what it draws.
+PARTS = (
+    ("", _Main),
+    ("_certificate", _Certificate),
+    ("_check", _Check),
+    ("_show", _Show),
+    ("_compare", _Compare),
+    ("_advanced", _Advanced),
 )
+
+
+@classmethod
+def _of_uv_editor(cls, context):
+    """Whether an Image Editor shows UVs."""
+    return context.space_data.mode == "UV"
+
+
+def _panels(prefix, space, poll=None):
+    """The panel of the add-on in one kind of editor, and those inside it."""
+    main = f"{prefix}_PT_ble_unwrap"
+    for suffix, part in PARTS:
+        own = {"bl_space_type": space, "__module__": __name__}
+        if suffix:
+            own["bl_parent_id"] = main
+        elif poll is not None:
+            own["poll"] = poll
+        yield type(f"{main}{suffix}", (part, bpy.types.Panel), own)
+
+
+CLASSES = (*_panels("IMAGE", "IMAGE_EDITOR", _of_uv_editor), *_panels("VIEW3D", "VIEW_3D"))
 
 
 def register():

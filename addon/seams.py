@@ -5,27 +5,21 @@ edit mode in Blender 4.2. They are no wish of the artist's: the next unwrap neit
 cuts nor follows them, and replaces them by its own. All others are the artist's and stay as they are.
 """
 
-import bmesh
 import numpy as np
 
-from .mesh_arrays import read_array, read_corner_vertices, read_face_offsets
+from .mesh_arrays import read_array, read_corner_edges, read_corner_vertices, read_edge_flags, read_face_offsets
 
 OWN_SEAMS = ".ble_unwrap_seam"  # the leading dot keeps it out of Blender's lists of attributes
 
 
 def wished_seams(mesh):
-    """The artist's own seams, (e,) bool; of a mesh that is up to date, in either mode."""
-    return read_array(mesh.edges, "use_seam", bool) & ~remembered(mesh)
+    """The artist's own seams, (e,) bool; of a mesh that is `in_bulk`."""
+    return read_edge_flags(mesh, "use_seam") & ~remembered(mesh)
 
 
 def remembered(mesh):
-    """Edges that we marked and that the artist may have cleared since, (e,) bool; in either mode."""
-    if mesh.is_editmode:
-        edges = bmesh.from_edit_mesh(mesh).edges
-        layer = edges.layers.int.get(OWN_SEAMS)
-        if layer is not None:
-            return np.fromiter((edge[layer] != 0 for edge in edges), bool, len(edges))
-    elif _is_ours(attribute := mesh.attributes.get(OWN_SEAMS)):
+    """Edges that we marked and that the artist may have cleared since, (e,) bool; of a mesh that is `in_bulk`."""
+    if _is_ours(attribute := mesh.attributes.get(OWN_SEAMS)):
         return read_array(attribute.data, "value", np.int32) != 0
     return np.zeros(len(mesh.edges), bool)
 
@@ -41,7 +35,7 @@ def mark_chart_borders(mesh, uv, source_faces, chart=None):
     where they meet. With `source_faces`, only edges of these faces are looked at. One of our seams that the
     artist has cleared is not marked again, unless all of them were cleared, which is to begin anew.
     """
-    seams, ours = read_array(mesh.edges, "use_seam", bool), remembered(mesh)
+    seams, ours = read_edge_flags(mesh, "use_seam"), remembered(mesh)
     looked_at = _edges_of(mesh, source_faces)
     border = chart_borders(mesh, uv, chart) & looked_at
     own_left = ours & seams
@@ -65,7 +59,7 @@ def _remember(mesh, ours):
 def _edges_of(mesh, faces):
     """Edges of these faces, or of all, (e,) bool."""
     result = np.zeros(len(mesh.edges), bool)
-    corner_edges = read_array(mesh.loops, "edge_index", np.int32)
+    corner_edges = read_corner_edges(mesh)
     if faces is None:
         result[corner_edges] = True
     else:
@@ -79,7 +73,7 @@ def chart_borders(mesh, uv, chart=None, tolerance=0.0):
     """Edges where the UVs, by more than a tolerance, or the charts of two neighbouring faces differ, (e,) bool."""
     corner_vertices = read_corner_vertices(mesh)
     offsets = read_face_offsets(mesh)
-    corner_edges = read_array(mesh.loops, "edge_index", np.int32)
+    corner_edges = read_corner_edges(mesh)
     following = np.arange(1, len(corner_vertices) + 1, dtype=np.int32)
     following[offsets[1:] - 1] = offsets[:-1]
     # UVs at both ends of a corner's edge, the lower vertex first, so that neighbours compare whatever their winding.

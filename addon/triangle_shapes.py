@@ -24,20 +24,34 @@ class Shapes:
         if triangles is None:
             triangles = np.arange(len(uv), dtype=np.int32).reshape(-1, 3)
         face = np.repeat(np.arange(selection.face_count), np.diff(selection.face_offsets))[triangles[:, 0]]
+        ends = np.ascontiguousarray(triangles.T)  # each coordinate is an array of its own, which is read in one go
         with np.errstate(all="ignore"):
-            a, b, c = selection.positions.astype(np.float64)[selection.corner_vertices[triangles]].transpose(1, 0, 2)
-            one, other = b - a, c - a
-            surface = 0.5 * np.linalg.norm(np.cross(one, other), axis=1)
-            a, b, c = (uv.astype(np.float64) * size)[triangles].transpose(1, 0, 2)
-            (ax, ay), (bx, by) = (b - a).T, (c - a).T
+            one, other = _sides(selection.positions, selection.corner_vertices[ends])
+            normal = [one[i] * other[j] - one[j] * other[i] for i, j in ((1, 2), (2, 0), (0, 1))]
+            surface = 0.5 * np.sqrt(sum(x * x for x in normal))
+            (ax, ay), (bx, by) = (
+                [side * length for side, length in zip(sides, size, strict=True)] for sides in _sides(uv, ends)
+            )
             twice = ax * by - ay * bx
-            along_u = (one * by[:, None] - other * ay[:, None]) / twice[:, None]
-            along_v = (other * ax[:, None] - one * bx[:, None]) / twice[:, None]
-            uu, uv_, vv = ((p * q).sum(axis=1) for p, q in ((along_u, along_u), (along_u, along_v), (along_v, along_v)))
+            along_u = [(p * by - q * ay) / twice for p, q in zip(one, other, strict=True)]
+            along_v = [(q * ax - p * bx) / twice for p, q in zip(one, other, strict=True)]
+            uu, uv_, vv = (
+                sum(p * q for p, q in zip(first, second, strict=True))
+                for first, second in ((along_u, along_u), (along_u, along_v), (along_v, along_v))
+            )
             longest = np.sqrt(0.5 * (uu + vv + np.hypot(uu - vv, 2 * uv_)))
             pixels = 0.5 * twice
             shortest = surface / np.abs(pixels) / longest
         return cls(face, surface, pixels, longest, shortest)
+
+
+def _sides(points, ends):
+    """From the first of each triangle's corners to the second and to the third: each a list of coordinates, (t,).
+
+    `ends` are the first, second and third corners, (3, t).
+    """
+    a, b, c = ([column[end] for column in points.T.astype(np.float64)] for end in ends)
+    return [[y - x for x, y in zip(a, to, strict=True)] for to in (b, c)]
 
 
 def medians(values, weights, group, count):

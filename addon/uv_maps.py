@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass
 
-import bmesh
 import numpy as np
 
-from .mesh_arrays import MeshError, read_array
+from .mesh_arrays import MeshError, in_bulk, read_array
 
 DEFAULT_NAME = "UVMap"
 MAX_UV_MAPS = 8  # Blender's own limit
@@ -86,11 +85,14 @@ def check_pins(obj, choice, corners):
 
 
 def pinned_corners(mesh, map_name):
-    """Corners whose UV is pinned, (c,) bool; of a mesh in either mode."""
-    count = len(mesh.loops)
-    if not mesh.is_editmode:
-        pins = mesh.uv_layers[map_name].pin
-        return read_array(pins, "value", bool) if len(pins) == count else np.zeros(count, bool)
-    edit_mesh = bmesh.from_edit_mesh(mesh)
-    layer = edit_mesh.loops.layers.uv[map_name]
-    return np.fromiter((loop[layer].pin_uv for face in edit_mesh.faces for loop in face.loops), bool, count)
+    """Corners whose UV is pinned, (c,) bool; of a mesh that is up to date, in either mode."""
+    with in_bulk(mesh) as readable:
+        pins = readable.uv_layers[map_name].pin
+        # Since Blender 5.0 there are none before the first is set.
+        return read_array(pins, "value", bool) if len(pins) else np.zeros(len(readable.loops), bool)
+
+
+def read_map(mesh, map_name):
+    """The UVs of a map by corner, (c, 2) float32; of a mesh that is up to date, in either mode."""
+    with in_bulk(mesh) as readable:
+        return read_array(readable.uv_layers[map_name].uv, "vector", np.float32, 2)

@@ -362,7 +362,17 @@ BRIDGES = {".mesh_bridge", ".cloud_bridge"}
 NEVER = {
     **{
         f"{name}.py": NATIVE | BRIDGES | {".properties"}
-        for name in ("mesh_arrays", "faces", "seams", "uv_maps", "map_state", "textures", "units")
+        for name in (
+            "mesh_arrays",
+            "faces",
+            "seams",
+            "vertex_groups",
+            "painted",
+            "uv_maps",
+            "map_state",
+            "textures",
+            "units",
+        )
     },
     "settings_table.py": NATIVE | BRIDGES | {"bpy", "bmesh", "numpy", ".properties"},
     "last_result.py": NATIVE | BRIDGES,

@@ -10,6 +10,8 @@ Repeat Last calls `execute` likewise, but takes no step back and puts none back:
 
 import bpy
 
+from .. import handlers
+
 
 class _Asked:
     name = None  # of the operator that is to be invoked
@@ -68,12 +70,15 @@ def put_back(*_):
     _Asked.was_put_back = True
 
 
+HANDLERS = (("redo_post", put_back),)
+
+
 def register():
-    bpy.app.handlers.redo_post.append(put_back)
+    handlers.add(HANDLERS)
 
 
 def unregister():
-    bpy.app.handlers.redo_post.remove(put_back)
+    handlers.remove(HANDLERS)
     for function in (_invoke, _bring_back):
         if bpy.app.timers.is_registered(function):
             bpy.app.timers.unregister(function)

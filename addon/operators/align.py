@@ -8,7 +8,7 @@ from .. import faces, last_result, properties, targets, uv_align
 from ..island_choice import IslandChoice
 from ..wording import counted
 from .map_poll import has_map
-from .with_progress import USER_ERRORS, redraw
+from .with_progress import USER_ERRORS, draw_properties, redraw
 
 SETTINGS = ("texture_size", "correct_aspect")
 # Radians: islands that would be turned by less are left as they are, to the bit.
@@ -61,12 +61,7 @@ class UV_OT_ble_unwrap_align(bpy.types.Operator):
         return {"FINISHED"}
 
     def draw(self, _context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        column = layout.column()
-        for name in (*SETTINGS, "lock_pinned"):
-            column.prop(self, name)
+        draw_properties(self, (*SETTINGS, "lock_pinned"))
 
 
 def aligned(islands, size):

@@ -51,9 +51,6 @@ class UV_OT_ble_unwrap_compare(WithProgress, bpy.types.Operator):
     def invoke(self, context, _event):
         return self.compute(context, in_background=not bpy.app.background)
 
-    def execute(self, context):
-        return self.compute(context, in_background=False)
-
     def _prepare(self, context):
         return smart_comparison.SmartComparison(
             targets.target_objects(context),
@@ -70,8 +67,8 @@ class UV_OT_ble_unwrap_compare(WithProgress, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class _Choice:
-    """What ends a comparison."""
+class _OnComparison:
+    """What there has to be a comparison for."""
 
     bl_options = {"UNDO"}
 
@@ -84,6 +81,10 @@ class _Choice:
             cls.poll_message_set("There is no comparison to choose from")
             return False
         return True
+
+
+class _Choice(_OnComparison):
+    """What ends a comparison."""
 
     def execute(self, context):
         try:
@@ -119,7 +120,7 @@ class UV_OT_ble_unwrap_keep(_Choice, bpy.types.Operator):
         return notes
 
 
-class UV_OT_ble_unwrap_look(_Choice, bpy.types.Operator):
+class UV_OT_ble_unwrap_look(_OnComparison, bpy.types.Operator):
     bl_idname = "uv.ble_unwrap_look"
     bl_label = "Look at This One"
     bl_description = (

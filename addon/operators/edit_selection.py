@@ -4,7 +4,8 @@ import bmesh
 import bpy
 import numpy as np
 
-from ..mesh_arrays import read_array
+from ..mesh_arrays import read_edge_flags, read_face_flags
+from ..wording import counted
 
 
 def leave_edit_mode(context):
@@ -33,9 +34,29 @@ def select_elements(context, found, kind):
         bmesh.update_edit_mesh(obj.data, loop_triangles=False, destructive=False)
 
 
-def visible_faces(mesh, faces):
-    """Those of the faces, by number, that are there and that edit mode would show."""
-    hidden = read_array(mesh.polygons, "hide", bool)
-    faces = np.array(faces, np.int64)
-    faces = faces[faces < len(hidden)]
-    return faces[~hidden[faces]]
+def show_elements(operator, context, find, kind, nothing):
+    """What an operator does that shows where edges or faces are, from leaving edit mode to what it returns.
+
+    `find` is called in object mode and returns objects, each with the numbers of its elements; what is hidden is left
+    out. `kind` is EDGE or FACE; `nothing` is said where nothing remains.
+    """
+    leave_edit_mode(context)
+    found = {
+        obj: shown
+        for obj, numbers in find().items()
+        if obj.visible_get() and (shown := visible_elements(obj.data, numbers, kind)).size
+    }
+    if not found:
+        operator.report({"WARNING"}, nothing)
+        return {"CANCELLED"}
+    select_elements(context, found, kind)
+    operator.report({"INFO"}, f"{counted(sum(map(len, found.values())), kind.lower())} selected")
+    return {"FINISHED"}
+
+
+def visible_elements(mesh, numbers, kind):
+    """Those of the edges or faces, by number, that are there and that edit mode would show."""
+    hidden = read_edge_flags(mesh, "hide") if kind == "EDGE" else read_face_flags(mesh, "hide")
+    numbers = np.array(numbers, np.int64)
+    numbers = numbers[numbers < len(hidden)]
+    return numbers[~hidden[numbers]]

@@ -3,11 +3,11 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
-from .. import faces, last_result, preferences, properties, running, targets
+from .. import faces, preferences, properties, targets
 from ..pack_task import PackTask
 from . import again
 from .map_poll import has_map
-from .with_progress import WithProgress, redraw
+from .with_progress import WithProgress
 
 # The settings that are not those of an unwrap. Blender remembers them from the last run.
 OWN_SETTINGS = ("scale", "keep_unselected", "lock_pinned", "keep_stacks")
@@ -22,6 +22,7 @@ class UV_OT_ble_unwrap_pack(WithProgress, bpy.types.Operator):
         "packed into one texture"
     )
     bl_options = {"REGISTER", "UNDO"}
+    shown = (*properties.PACK_SETTINGS, *OWN_SETTINGS)
 
     __annotations__ = properties.operator_annotations(properties.PACK_SETTINGS) | {
         "scale": EnumProperty(
@@ -70,40 +71,21 @@ class UV_OT_ble_unwrap_pack(WithProgress, bpy.types.Operator):
         self.from_sidebar = True
         return self.compute(context, in_background=not bpy.app.background)
 
-    def execute(self, context):
-        return self.compute(context, in_background=False)
-
-    def draw(self, _context):
-        layout = self.layout
-        if running.is_there():
-            running.draw(layout)
-            return
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        column = layout.column()
-        for name in (*properties.PACK_SETTINGS, *OWN_SETTINGS):
-            column.prop(self, name)
-
     def _prepare(self, context):
         if not self.properties.is_property_set("by_uv"):
             self.by_uv = faces.by_uv_selection(context)
         return PackTask(
             targets.target_objects(context),
-            properties.plain_values(self, (*properties.PACK_SETTINGS, *OWN_SETTINGS)),
+            properties.plain_values(self, self.shown),
             threads=preferences.preference(context, "threads"),
             by_uv=self.by_uv,
         )
 
     def _finish(self, context, task, packed):
         outcome = task.write(packed)
-        last_result.compare()
         if self.from_sidebar:
             properties.copy_named(self.properties, context.scene.ble_unwrap, properties.PACK_SETTINGS)
-        for text in outcome.warnings:
-            self.report({"WARNING"}, text)
-        self.report({"INFO"}, f"{self.bl_label}: {outcome.summary}")
-        redraw(context)
-        return {"FINISHED"}
+        return self._tell(context, outcome.warnings, outcome.summary)
 
     def _fail(self, error):
         if "obstacles" in str(error):

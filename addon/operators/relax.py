@@ -6,10 +6,10 @@ The first starts from how an island is, the second from nothing but its outline 
 import bpy
 from bpy.props import BoolProperty
 
-from .. import faces, last_result, preferences, properties, targets
+from .. import faces, preferences, properties, targets
 from ..relax_task import RelaxTask
 from .map_poll import has_map
-from .with_progress import WithProgress, redraw
+from .with_progress import WithProgress
 
 SETTINGS = ("texture_size", "correct_aspect")
 
@@ -18,6 +18,7 @@ class OnIslands(WithProgress):
     """What both have in common. `anew` says which it is."""
 
     anew = False
+    shown = SETTINGS
 
     @classmethod
     def poll(cls, context):
@@ -26,17 +27,6 @@ class OnIslands(WithProgress):
     def invoke(self, context, _event):
         properties.copy_unset(self.properties, context.scene.ble_unwrap, SETTINGS)
         return self.compute(context, in_background=not bpy.app.background)
-
-    def execute(self, context):
-        return self.compute(context, in_background=False)
-
-    def draw(self, _context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        column = layout.column()
-        for name in SETTINGS:
-            column.prop(self, name)
 
     def _prepare(self, context):
         if not self.properties.is_property_set("by_uv"):
@@ -51,12 +41,7 @@ class OnIslands(WithProgress):
 
     def _finish(self, context, task, relaxed):
         outcome = task.write(relaxed)
-        last_result.compare()
-        for text in outcome.warnings:
-            self.report({"WARNING"}, text)
-        self.report({"INFO"}, f"{self.bl_label}: {outcome.summary}")
-        redraw(context)
-        return {"FINISHED"}
+        return self._tell(context, outcome.warnings, outcome.summary)
 
 
 def annotations():

@@ -5,8 +5,8 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from .. import last_result
-from ..mesh_arrays import crowded_edges, opposed_edges, read_array
-from .edit_selection import leave_edit_mode, select_elements
+from ..mesh_arrays import crowded_edges, opposed_edges
+from .edit_selection import show_elements
 
 EDGES = {"CROWDED": crowded_edges, "OPPOSED": opposed_edges}
 
@@ -43,22 +43,13 @@ class MESH_OT_ble_unwrap_select_edges(bpy.types.Operator):
         return True
 
     def execute(self, context):
-        leave_edit_mode(context)
-        visible = [obj for obj in last_result.objects(context) if obj.type == "MESH" and obj.visible_get()]
-        found = {obj: shown for obj in visible if (shown := visible_edges(obj.data, EDGES[self.kind])).size}
-        if not found:
-            which = {"CROWDED": "has more than two faces", "OPPOSED": "lies between opposed faces"}[self.kind]
-            self.report({"WARNING"}, f"No visible edge of these meshes {which}")
-            return {"CANCELLED"}
-        select_elements(context, found, "EDGE")
-        count = sum(map(len, found.values()))
-        self.report({"INFO"}, f"{count:,} edge{'' if count == 1 else 's'} selected")
-        return {"FINISHED"}
+        which = {"CROWDED": "has more than two faces", "OPPOSED": "lies between opposed faces"}[self.kind]
 
+        def find():
+            meshes = [obj for obj in last_result.objects(context) if obj.type == "MESH"]
+            return {obj: np.flatnonzero(EDGES[self.kind](obj.data)) for obj in meshes}
 
-def visible_edges(mesh, is_meant):
-    """Indices of the edges that are meant and that edit mode would show."""
-    return np.flatnonzero(is_meant(mesh) & ~read_array(mesh.edges, "hide", bool))
+        return show_elements(self, context, find, "EDGE", f"No visible edge of these meshes {which}")
 
 
 def register():

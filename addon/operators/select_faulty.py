@@ -4,8 +4,7 @@ import bpy
 from bpy.props import EnumProperty
 
 from .. import last_check
-from ..wording import counted
-from .edit_selection import leave_edit_mode, select_elements, visible_faces
+from .edit_selection import show_elements
 
 
 class MESH_OT_ble_unwrap_select_faulty(bpy.types.Operator):
@@ -40,18 +39,8 @@ class MESH_OT_ble_unwrap_select_faulty(bpy.types.Operator):
         return True
 
     def execute(self, context):
-        leave_edit_mode(context)
-        found = {
-            obj: shown
-            for obj, faces in last_check.faulty_faces(self.kind).items()
-            if obj.visible_get() and (shown := visible_faces(obj.data, faces)).size
-        }
-        if not found:
-            self.report({"WARNING"}, "No visible face of these meshes is meant; check the UV map again")
-            return {"CANCELLED"}
-        select_elements(context, found, "FACE")
-        self.report({"INFO"}, f"{counted(sum(map(len, found.values())), 'face')} selected")
-        return {"FINISHED"}
+        nothing = "No visible face of these meshes is meant; check the UV map again"
+        return show_elements(self, context, lambda: last_check.faulty_faces(self.kind), "FACE", nothing)
 
 
 def register():

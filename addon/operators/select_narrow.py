@@ -3,7 +3,7 @@
 import bpy
 
 from .. import last_result
-from .edit_selection import leave_edit_mode, select_elements, visible_faces
+from .edit_selection import show_elements
 
 
 class MESH_OT_ble_unwrap_select_narrow(bpy.types.Operator):
@@ -20,19 +20,8 @@ class MESH_OT_ble_unwrap_select_narrow(bpy.types.Operator):
         return True
 
     def execute(self, context):
-        leave_edit_mode(context)
-        found = {
-            obj: shown
-            for obj, faces in last_result.narrow_faces(context).items()
-            if obj.visible_get() and (shown := visible_faces(obj.data, faces)).size
-        }
-        if not found:
-            self.report({"WARNING"}, "No visible face of these meshes is in a chart narrower than two texels")
-            return {"CANCELLED"}
-        select_elements(context, found, "FACE")
-        count = sum(map(len, found.values()))
-        self.report({"INFO"}, f"{count:,} face{'' if count == 1 else 's'} selected")
-        return {"FINISHED"}
+        nothing = "No visible face of these meshes is in a chart narrower than two texels"
+        return show_elements(self, context, lambda: last_result.narrow_faces(context), "FACE", nothing)
 
 
 def register():

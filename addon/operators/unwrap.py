@@ -3,11 +3,11 @@
 import bpy
 from bpy.props import BoolProperty
 
-from .. import faces, kept_analysis, last_result, preferences, properties, running, targets
+from .. import faces, handlers, kept_analysis, last_result, preferences, properties, targets
 from ..panel import panel_settings
 from ..run import Run
 from . import again
-from .with_progress import WithProgress, redraw
+from .with_progress import WithProgress, draw_properties, redraw
 
 
 class UV_OT_ble_unwrap(WithProgress, bpy.types.Operator):
@@ -42,19 +42,8 @@ class UV_OT_ble_unwrap(WithProgress, bpy.types.Operator):
         self.from_sidebar = True
         return self.compute(context, in_background=not bpy.app.background)
 
-    def execute(self, context):
-        return self.compute(context, in_background=False)
-
-    def draw(self, context):
-        layout = self.layout
-        if running.is_there():
-            running.draw(layout)
-            return
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        column = layout.column()
-        for name in panel_settings(self, context, ("preset", *properties.MAIN_SETTINGS)):
-            column.prop(self, name)
+    def _draw_settings(self, context):
+        layout = draw_properties(self, panel_settings(self, context, ("preset", *properties.MAIN_SETTINGS)))
         for title, names in properties.ADVANCED_SETTINGS:
             names = panel_settings(self, context, names)
             if not names:
@@ -123,12 +112,15 @@ def forget(*_):
     kept_analysis.forget()
 
 
+HANDLERS = (("load_post", forget),)
+
+
 def register():
     bpy.utils.register_class(UV_OT_ble_unwrap)
-    bpy.app.handlers.load_post.append(forget)
+    handlers.add(HANDLERS)
 
 
 def unregister():
-    bpy.app.handlers.load_post.remove(forget)
+    handlers.remove(HANDLERS)
     kept_analysis.forget()
     bpy.utils.unregister_class(UV_OT_ble_unwrap)

@@ -2,7 +2,7 @@
 
 import bpy
 
-from .. import engine, mesh_bridge, preferences, running
+from .. import engine, last_result, mesh_bridge, preferences, running
 from . import again
 
 # The add-on's failures that are the user's business; anything else is a bug and may show its traceback.
@@ -28,12 +28,27 @@ PASSED_EVENTS = {
 class WithProgress:
     """An operator made of a `_prepare`, which reads, and a `_finish`, which writes what was computed in between.
 
+    `shown` names the properties in its redo panel.
+
     `_prepare(context)` returns the work: it has an `element_count`, and computes at once by `run` or on another thread
     by `start`. `_finish(context, work, result)` writes the result, reports and returns what an operator returns.
     Whenever either raises one of `USER_ERRORS`, nothing has been changed.
     """
 
+    shown = ()
     _replaces = False  # whether this is a run in the place of a former one, from the redo panel
+
+    def execute(self, context):
+        return self.compute(context, in_background=False)
+
+    def draw(self, context):
+        if running.is_there():
+            running.draw(self.layout)
+        else:
+            self._draw_settings(context)
+
+    def _draw_settings(self, _context):
+        draw_properties(self, self.shown)
 
     def compute(self, context, *, in_background):
         """Everything from reading to writing; `in_background` where the work is large and there are events to wait for.
@@ -116,6 +131,15 @@ class WithProgress:
         context.window_manager.progress_end()
         context.workspace.status_text_set(None)
 
+    def _tell(self, context, warnings, text):
+        """Ends a `_finish` that has written UVs: says what was done, and shows them."""
+        last_result.compare()
+        for warning in warnings:
+            self.report({"WARNING"}, warning)
+        self.report({"INFO"}, f"{self.bl_label}: {text}")
+        redraw(context)
+        return {"FINISHED"}
+
     def _cancelled(self):
         if self._replaces:
             again.bring_back()
@@ -141,6 +165,17 @@ def _is_on_button(context, event):
                 # There is no other way to ask Blender what the pointer is on.
                 return bpy.ops.ui.copy_python_command_button.poll()
     return False
+
+
+def draw_properties(operator, names):
+    """Draws these properties in the redo panel of an operator, and returns the panel's layout."""
+    layout = operator.layout
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    column = layout.column()
+    for name in names:
+        column.prop(operator, name)
+    return layout
 
 
 def redraw(context):

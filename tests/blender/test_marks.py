@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 import pytest
-from scenes import assert_good, certificate, cube, edit, fingerprint, grid, is_cut, sphere
+from scenes import add_mesh, assert_good, certificate, cube, edit, fingerprint, grid, is_cut, select, sphere
 
 unwrap = bpy.ops.uv.ble_unwrap
 
@@ -154,6 +154,28 @@ def test_only_edges_between_two_faces_with_area_are_sharp_by_their_angle(addon):
     marks = addon("mesh_bridge").read_mesh(mesh, None, 60.0)["marks"]
     assert [sorted(edge) for edge in marks["sharp"].tolist()] == [[1, 2]]
     assert not len(addon("mesh_bridge").read_mesh(mesh, None, 91.0)["marks"]["sharp"])
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_angles_are_those_of_the_shape_that_is_seen(addon, mode):
+    """A roof of 2 × 20° that is scaled to three times its height is one of 2 × 47.5°, also mirrored and turned."""
+    height = float(np.tan(np.radians(20.0)))
+    points = [(-1, 0, 0), (-1, 1, 0), (0, 0, height), (0, 1, height), (1, 0, 0), (1, 1, 0)]
+    obj = add_mesh("Roof", points, [(0, 2, 3, 1), (2, 4, 5, 3)])
+    edit(obj) if mode == "EDIT" else select(obj)
+
+    def is_sharp(angle):
+        bpy.context.view_layer.update()
+        sharp = addon("mesh_bridge").gather([obj], sharp_angle=angle).marks["sharp"]
+        assert [sorted(edge) for edge in sharp.tolist()] in ([], [[2, 3]])
+        return len(sharp) == 1
+
+    assert is_sharp(39.9) and not is_sharp(40.1)
+    seen = 2 * float(np.degrees(np.arctan(3.0 * height)))
+    obj.rotation_euler = (0.4, 0.3, 0.9)
+    for scale in ((1, 1, 3), (-1, 1, 3), (2, 2, 6)):
+        obj.scale = scale
+        assert is_sharp(seen - 0.1) and not is_sharp(seen + 0.1)
 
 
 def test_marks_of_selected_faces_are_read(addon):

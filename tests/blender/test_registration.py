@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import types
 from pathlib import Path
 
 import addon_loader
@@ -141,8 +142,11 @@ def test_unregister_leaves_nothing_and_register_works_again(addon):
     registration = addon("registration")
     classes = {name for name in dir(bpy.types) if "ble_unwrap" in name.lower()}
     assert classes
+    called = called_after_events(addon)
+    assert {event for event, _ in called} == {"depsgraph_update_post", "undo_post", "redo_post", "load_post"}
     registration.unregister()
     try:
+        assert not called_after_events(addon)
         assert not {name for name in dir(bpy.types) if "ble_unwrap" in name.lower()}
         assert not hasattr(bpy.types.Scene, "ble_unwrap")
         assert not hasattr(bpy.types.WindowManager, "ble_unwrap_certificate")
@@ -153,6 +157,37 @@ def test_unregister_leaves_nothing_and_register_works_again(addon):
         registration.register()
     assert {name for name in dir(bpy.types) if "ble_unwrap" in name.lower()} == classes
     assert entries("IMAGE_MT_uvs_unwrap", addon) == 1
+    assert sorted(called_after_events(addon)) == sorted(called)
+
+
+def called_after_events(addon):
+    """The functions of the add-on that Blender calls, each with the name of the event."""
+    package = addon("registration").__package__
+    lists = {event: getattr(bpy.app.handlers, event) for event in dir(bpy.app.handlers)}
+    return [
+        (event, f"{function.__module__}.{function.__name__}")
+        for event, functions in lists.items()
+        if isinstance(functions, list)
+        for function in functions
+        if function.__module__.startswith(package)
+    ]
+
+
+def test_both_editors_have_the_same_panels(addon):
+    """A panel that holds the others, each drawn by the same code; in Image Editors only where these show UVs."""
+    found = {}
+    for prefix, space in (("IMAGE", "IMAGE_EDITOR"), ("VIEW3D", "VIEW_3D")):
+        main = f"{prefix}_PT_ble_unwrap"
+        panels = {name: getattr(bpy.types, name) for name in dir(bpy.types) if name.startswith(main)}
+        assert len(panels) == 6
+        for name, panel in panels.items():
+            assert (panel.bl_space_type, panel.bl_region_type, panel.bl_category) == (space, "UI", "BLE Unwrap")
+            assert getattr(panel, "bl_parent_id", None) == (None if name == main else main)
+        found[prefix] = {name.removeprefix(main): panel.draw for name, panel in panels.items()}
+    assert found["IMAGE"] == found["VIEW3D"]
+    for mode, shown in (("UV", True), ("PAINT", False)):
+        context = types.SimpleNamespace(space_data=types.SimpleNamespace(mode=mode))
+        assert addon("panel").CLASSES[0].poll(context) == shown
 
 
 def test_failed_registration_takes_back_what_was_registered(addon, monkeypatch):
