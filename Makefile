@@ -1,6 +1,7 @@
 # make test   everything: Rust, the wheel, Python without Blender, the add-on in every bpy that can be had
 # make wheel  this platform's wheel: addon/wheels/; make zip the extension with it: out/
 # make zips   wheels and extensions for all platforms: out/release/; make wheels the wheels alone, make wheel PLATFORM=… one of them
+# make emulated-tests PLATFORM=…  the tests of a wheel in out/release/ for another platform, under an emulator of it
 # make demo   unwrap the demonstration meshes and compare with Smart UV Project: out/
 # make settings  what README, type stub, documentation and add-on say of the settings, from the core's table
 # make bench  times of the stages; make flamegraph where the time of one unwrap goes; make scaling time and memory against faces
@@ -26,7 +27,7 @@ CRATES := native/ble_unwrap_core native/ble_unwrap_native
 NATIVE := Cargo.toml Cargo.lock .ci/build_wheel .ci/platforms.py .ci/third_party_licenses $(shell find $(CRATES) -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name settings.txt 2>/dev/null)
 
 .PHONY: test test-rust test-python test-blender settings bench flamegraph scaling quality packing shapes contact-sheet lint format venv wheel zip wheels zips \
-	demo paper paper-page clean
+	emulated-tests demo paper paper-page clean
 
 test: test-rust lint test-python test-blender
 
@@ -99,6 +100,9 @@ wheels: $(VENV)/.ready
 
 zips: wheels
 	$(BIN)/python .ci/build_extension $(RELEASE) $(RELEASE)/*.whl
+
+emulated-tests: $(VENV)/.ready
+	PATH="$(CURDIR)/$(BIN):$$PATH" .ci/emulated_tests $(PLATFORM) $(RELEASE)
 
 demo: zip
 	.ci/blender_libraries

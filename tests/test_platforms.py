@@ -1,10 +1,12 @@
 """What is built for which platform, and what an extension says of itself: the scripts in `.ci`, with made-up wheels.
 
-No wheel is built here. That the real archives are valid is for Blender to say.
+No wheel is built here. That the real archives are valid is for Blender to say: `.ci/validate_extensions`.
 """
 
 import importlib.machinery
 import importlib.util
+import re
+import subprocess
 import sys
 import tomllib
 import zipfile
@@ -19,6 +21,7 @@ import platforms  # noqa: E402
 
 MANIFEST = (ROOT / "addon/blender_manifest.toml").read_text(encoding="utf-8")
 VERSION = tomllib.loads(MANIFEST)["version"]
+WORKFLOW = (ROOT / ".github/workflows/release.yml").read_text(encoding="utf-8")
 NAMES = ["linux-x64", "linux-arm64", "windows-x64", "macos-arm64", "macos-x64"]
 # Of those that a manifest may name, see Blender's manual on extensions.
 BLENDERS = {"windows-x64", "windows-arm64", "macos-x64", "macos-arm64", "linux-x64", "linux-arm64"}
@@ -211,3 +214,67 @@ def test_a_new_wheel_takes_the_place_of_the_old_one_of_its_platform_alone(build_
     licences, maturin = ran
     assert Path(licences[1]).name == "third_party_licenses" and licences[-1] == host.target
     assert maturin[:2] == ["maturin", "build"] and maturin[-2:] == ["--out", str(tmp_path)]
+
+
+# The release --------------------------------------------------------------------------------------------------------
+
+
+def test_the_workflow_builds_every_platform_on_a_machine_of_its_system():
+    rows = re.findall(r"(?m)^ +- platform: (\S+)\n +runner: (\S+)$", WORKFLOW)
+    assert [name for name, _ in rows] == NAMES
+    systems = {"linux": "ubuntu", "windows": "windows", "macos": "macos"}
+    for name, runner in rows:
+        assert runner.startswith(systems[name.split("-")[0]]), name
+    runners = dict(rows)
+    assert runners["linux-arm64"].endswith("-arm") and not runners["linux-x64"].endswith("-arm")
+    assert runners["macos-x64"].endswith("-intel") and not runners["macos-arm64"].endswith("-intel")
+
+
+def test_the_workflow_releases_only_what_was_tested_and_on_a_tag_alone():
+    release = WORKFLOW[WORKFLOW.index("\n  release:\n") :]
+    assert "if: startsWith(github.ref, 'refs/tags/v')" in release
+    assert "needs: [build, extension]" in release
+    assert release.index(".ci/check_release") < release.index("gh release create")
+    assert "out/release/*.whl out/release/*.zip" in release
+    assert WORKFLOW.count("contents: write") == 1 == release.count("contents: write")
+
+
+def test_the_workflow_runs_what_is_there():
+    named = set(re.findall(r"(?<![\w.])(?:\.ci|tests)/[\w./]+", WORKFLOW)) - {"tests/test_"}
+    listed = re.search(r"tests/test_\{([\w,]+)\}\.py", WORKFLOW)[1].split(",")
+    named |= {f"tests/test_{name}.py" for name in listed}
+    assert {".ci/build_wheel", ".ci/build_extension", ".ci/requirements.txt", "tests/test_native_api.py"} <= named
+    assert [name for name in sorted(named) if not (ROOT / name).is_file()] == []
+    requirements = (ROOT / ".ci/requirements.txt").read_text(encoding="utf-8")
+    chosen = re.search(r"grep -E '\^\(([\w|]+)\)", WORKFLOW)[1].split("|")
+    assert [name for name in chosen if not re.search(rf"(?m)^{name}\b", requirements)] == []
+
+
+def test_a_release_is_checked_for_completeness(build_extension, tmp_path):
+    check, folder = script("check_release"), tmp_path / "w"
+    build_extension.main([folder, *wheels(folder)])
+    assert list(check.complaints(f"v{VERSION}", folder)) == []
+    assert len(list(check.complaints("v99.0", folder))) == len(NAMES) + 1
+
+    (folder / f"ble_unwrap-{VERSION}-windows_x64.zip").unlink()
+    (missing,) = check.complaints(f"v{VERSION}", folder)
+    assert missing.startswith("The extensions are ")
+
+    build_extension.main([folder, *folder.glob("*.whl")])
+    (folder / wheel_name(platforms.named("macos-x64"))).write_bytes(b"built anew")
+    (stale,) = check.complaints(f"v{VERSION}", folder)
+    assert "macos_x64.zip does not hold" in stale
+
+    (folder / wheel_name(platforms.named("macos-x64"))).unlink()
+    assert len(list(check.complaints(f"v{VERSION}", folder))) == 2, "a wheel that is missing, an archive without one"
+
+
+def test_an_emulator_is_asked_for_by_platform(tmp_path):
+    """Before it makes anything: a platform without an emulator is no failure, and a folder without its wheel is one."""
+    command = [ROOT / ".ci/emulated_tests"]
+    none = subprocess.run([*command, "macos-arm64", tmp_path], capture_output=True, text=True, check=False)
+    assert none.returncode == 3 and "no emulator of macos-arm64" in none.stderr
+    wheels(tmp_path)
+    (tmp_path / wheel_name(platforms.named("linux-arm64"))).unlink()
+    empty = subprocess.run([*command, "linux-arm64", tmp_path], capture_output=True, text=True, check=False)
+    assert empty.returncode == 2 and "holds 0 wheels for linux-arm64" in empty.stderr
