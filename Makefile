@@ -1,5 +1,8 @@
 # make test   everything: Rust, the wheel, Python without Blender, the add-on in every bpy that can be had
 # make test-gui  the add-on by mouse and keys in windows of real Blenders (4.3, 5.2), which Debian as root can have; pictures: out/gui
+# make wheel  this platform's wheel: addon/wheels/; make zip the extension with it: out/
+# make zips   wheels and extensions for all platforms: out/release/; make wheels the wheels alone, make wheel PLATFORM=… one of them
+# make emulated-tests PLATFORM=…  the tests of a wheel in out/release/ for another platform, under an emulator of it
 # make demo   unwrap the demonstration meshes and compare with Smart UV Project: out/
 # make settings  what README, type stub, documentation and add-on say of the settings, from the core's table
 # make bench  times of the stages; make flamegraph where the time of one unwrap goes; make scaling time and memory against faces
@@ -20,12 +23,13 @@ CARGO ?= cargo
 VENV := .venv-py
 BIN := $(VENV)/bin
 WHEELS := addon/wheels
+RELEASE := out/release
 CRATES := native/ble_unwrap_core native/ble_unwrap_native
-# What the wheel is made of. Official Blender runs on glibc 2.28, which zig links against on any newer system.
-NATIVE := Cargo.toml Cargo.lock .ci/build_wheel .ci/third_party_licenses $(shell find $(CRATES) -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name settings.txt 2>/dev/null)
+# What the wheel is made of.
+NATIVE := Cargo.toml Cargo.lock .ci/build_wheel .ci/platforms.py .ci/third_party_licenses $(shell find $(CRATES) -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name settings.txt 2>/dev/null)
 
-.PHONY: test test-rust test-python test-blender test-gui settings bench flamegraph scaling quality packing shapes contact-sheet lint format venv wheel zip demo \
-	paper paper-page clean
+.PHONY: test test-rust test-python test-blender test-gui settings bench flamegraph scaling quality packing shapes contact-sheet lint format venv wheel zip wheels zips \
+	emulated-tests demo paper paper-page clean
 
 test: test-rust lint test-python test-blender
 
@@ -87,10 +91,25 @@ format: $(VENV)/.ready
 
 venv: $(VENV)/.ready
 
+# The tests install the wheel that lies in the add-on's folder; those of a release lie apart.
+ifdef PLATFORM
+wheel: $(VENV)/.ready
+	$(BIN)/python .ci/build_wheel $(RELEASE) $(PLATFORM)
+else
 wheel: $(WHEELS)/.built
+endif
 
-zip: wheel
-	$(BIN)/python .ci/build_extension
+zip: $(WHEELS)/.built
+	$(BIN)/python .ci/build_extension out $(WHEELS)/*.whl
+
+wheels: $(VENV)/.ready
+	$(BIN)/python .ci/build_wheel $(RELEASE) all
+
+zips: wheels
+	$(BIN)/python .ci/build_extension $(RELEASE) $(RELEASE)/*.whl
+
+emulated-tests: $(VENV)/.ready
+	PATH="$(CURDIR)/$(BIN):$$PATH" .ci/emulated_tests $(PLATFORM) $(RELEASE)
 
 demo: zip
 	.ci/blender_libraries
@@ -124,7 +143,7 @@ $(VENV)/.packing: native/evaluation/packing/requirements.txt $(VENV)/.ready
 	touch $@
 
 $(WHEELS)/.built: $(NATIVE) $(VENV)/.ready
-	.ci/build_wheel $(BIN) $(WHEELS)
+	$(BIN)/python .ci/build_wheel $(WHEELS)
 	touch $@
 
 $(VENV)/.wheel: $(WHEELS)/.built

@@ -7,11 +7,16 @@ import importlib.metadata
 import re
 import runpy
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 REPO = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(REPO / ".ci"))
+
+import platforms  # noqa: E402
+
 SCRIPT = REPO / ".ci" / "third_party_licenses"
 
 
@@ -36,9 +41,9 @@ def carried():
     return texts
 
 
-def test_every_crate_of_the_wheel_is_covered(carried, script):
-    """Each with the text of the licence that it is under, not just with any text."""
-    tree = ["cargo", "tree", "--locked", "-p", "ble_unwrap_native", "-e", "normal", "--prefix", "none"]
+def licences_by_cargo_tree(*options):
+    """Crate and version -> licence, of what the wheel is compiled from."""
+    tree = ["cargo", "tree", "--locked", "-p", "ble_unwrap_native", "-e", "normal", "--prefix", "none", *options]
     lines = subprocess.run(
         [*tree, "--format", "{p}|{l}"], cwd=REPO, check=True, stdout=subprocess.PIPE, text=True
     ).stdout.splitlines()
@@ -49,10 +54,46 @@ def test_every_crate_of_the_wheel_is_covered(carried, script):
         if not name.startswith("ble_unwrap"):
             licences[f"{name} {version.removeprefix('v')}"] = licence
     assert len(licences) > 20, "cargo tree lists no dependencies"
+    return licences
+
+
+def test_every_crate_of_the_wheel_is_covered(carried, script):
+    """Each with the text of the licence that it is under, not just with any text."""
+    licences = licences_by_cargo_tree()
     assert set(licences) <= set(carried)
     for crate, licence in licences.items():
         assert all(text.strip() for text in carried[crate]), crate
         assert script["is_covered"](licence, carried[crate]), f"{crate} is under {licence}"
+
+
+@pytest.mark.parametrize("target", [*(p.target for p in platforms.PLATFORMS), "x86_64-pc-windows-msvc"])
+def test_every_platform_has_the_licences_of_its_own_crates(script, target):
+    """For Macs, crates are compiled that no other platform has."""
+    crates = script["compiled_crates"](target)
+    named = {f"{crate['name']} {crate['version']}" for crate in crates}
+    assert set(licences_by_cargo_tree("--target", target)) <= named
+    assert any(name.startswith("sysctl ") for name in named) == ("apple" in target)
+    assert any(name.startswith("private-gemm-x86 ") for name in named) == target.startswith("x86_64")
+    for crate in crates:
+        assert all(text.strip() for text in script["texts_of"](crate)), crate["name"]
+
+
+def test_what_mingw_links_for_windows_is_covered(script, tmp_path, monkeypatch):
+    """And only that: neither Microsoft's linker nor another platform brings its C library."""
+    linked = script["linked_libraries"]
+    copyright_file = tmp_path / "copyright"
+    copyright_file.write_text("The terms of MinGW's C library\n", encoding="utf-8")
+    monkeypatch.setitem(linked.__globals__, "MINGW_LICENCES", (tmp_path / "nowhere", copyright_file))
+    macros = "#define __MINGW64_VERSION_MAJOR 10\n#define __MINGW64_VERSION_MINOR 2\n"
+    monkeypatch.setitem(linked.__globals__, "output_of", lambda *_command: macros)
+    (package,) = linked("x86_64-pc-windows-gnu")
+    assert (package["name"], package["version"]) == ("mingw-w64-runtime", "10.2")
+    assert script["texts_of"](package) == ["The terms of MinGW's C library\n"]
+    others = {platform.target for platform in platforms.PLATFORMS} - {"x86_64-pc-windows-gnu"}
+    assert [target for target in (*others, "x86_64-pc-windows-msvc") if linked(target)] == []
+    copyright_file.unlink()
+    with pytest.raises(SystemExit, match="licences of MinGW"):
+        linked("x86_64-pc-windows-gnu")
 
 
 def test_the_standard_library_is_covered(carried, script):
