@@ -352,7 +352,7 @@ def test_a_belt_is_in_few_pieces(name, number, kind):
 @cases(
     "torus",
     short={
-        "cut into rings or into pieces with ragged ends": ["1*"],
+        "two rings that hang together": ["1"],
         "one strip, but with bulging ends and curved sides": ["3"],
         "one chart of a shape that tells nothing of a ring": ["3, triangles", "3, turned"],
     },
@@ -364,7 +364,7 @@ def test_a_torus_is_one_or_two_rectangles(name, number, kind):
         assert_rectangle(layout, chart)
 
 
-@cases("torus", short={"the cut is elsewhere, and steps aside": ["1, triangles", "1, turned"]})
+@cases("torus", short={"the cut is elsewhere, and steps aside": ["1, turned"]})
 def test_a_torus_is_cut_along_its_inner_equator(name, number, kind):
     layout, _ = unwrapped(name, number, kind)
     base = common_shapes.mesh(name, number).positions
@@ -542,7 +542,7 @@ def test_no_quad_is_bent(name, number):
         "a cap hangs on, or it is apart": ["barrel 1*"],
         "in one piece or in two": ["bracket 1, triangles", "bracket 3*"],
         "flattened by planes, or rims and panels together": ["crate 3*"],
-        "strips are cut across at other places": ["cable 3*", "belt 2*", "belt 3*"],
+        "strips are cut across at other places": ["belt 1*", "belt 2*"],
         "cut along other lines": ["torus 1*", "ball 1*", "rock 3*"],
     },
 )

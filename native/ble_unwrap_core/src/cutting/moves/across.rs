@@ -1,7 +1,8 @@
 //! Charts too long for the texture, cut across.
 //!
 //! A ring or a coil unrolls to a ribbon, a frame to a spider: one chart, hardly stretched, and a texture large enough to hold
-//! it is all but empty. A few cuts across, each as short as the chart is narrow there, let the texture be filled.
+//! it is all but empty. A few cuts across, each as short as the chart is narrow there, let the texture be filled. The parts are as long as each other where
+//! that is to be had: the longest of them says how large all may be drawn, and like parts lie well beside each other.
 
 use std::f64::consts::PI;
 
@@ -21,8 +22,15 @@ use super::super::state::{ChartId, Cutting};
 use super::super::trial::{Verdict, trial};
 use super::{Proposal, Start};
 
-/// The cut runs in so much of the length around the middle, or where no polygon ends there, beside it.
-const PLACES: [[f64; 2]; 5] = [[0.4, 0.6], [0.3, 0.5], [0.5, 0.7], [0.2, 0.4], [0.6, 0.8]];
+/// The cut runs in so much of the length of a part on either side of where it makes parts of equal length; within the first, if it is hardly longer there.
+const AROUND: [f64; 2] = [0.06, 0.2];
+/// Where no polygon ends there, it runs beside the middle.
+const BESIDE: [[f64; 2]; 4] = [[0.3, 0.5], [0.5, 0.7], [0.2, 0.4], [0.6, 0.8]];
+/// A cut in just the right place may be longer by this share than one in the wider surroundings.
+const LONGER: f64 = 0.05;
+/// A part as it was planned fills the texture to this share of the plan at least, since a cut runs where polygons end. One that does less has another form, and
+/// is looked at anew.
+const AS_PLANNED: f64 = 0.6;
 /// A cut is no longer than so many times the mean width of the chart, its area over its length: a straight one across a strip is
 /// as long as that, and one along the sides of a triangulation up to about 1.4 times. What is longer runs along the chart, as
 /// the diagonals of triangles do that are as long as the chart itself.
@@ -31,6 +39,8 @@ const MOST_CUT: f64 = 1.5;
 const DIRECTIONS: usize = 24;
 /// Cuts in two, one after the other, that a part comes out of at most.
 const MOST_CUTS: usize = 6;
+/// A chart is cut into no more parts at once.
+const MOST_PARTS: usize = 1 << MOST_CUTS;
 
 /// The charts of a surface, with those cut across that are too long for the texture of `settings`. All parts stay under the limit,
 /// and lie where they lay in their chart but for what that takes. Sorted by lowest face. O(n log n).
@@ -49,26 +59,87 @@ pub(crate) fn cut_across(
     let mut cutting = Cutting::new(mesh, polygon, charts);
     let is_too_long = |chart: &Chart| cost::fill_asks_for_a_cut(most_filled(chart), self_border(chart));
     let too_long = |id: &ChartId| cutting.chart(*id).is_some_and(is_too_long);
-    let mut open: Vec<(ChartId, usize)> = cutting.ids().filter(too_long).map(|id| (id, 0)).collect();
-    while let Some((id, cuts)) = open.pop() {
+    let filled_by = |hold: f64| area / (tiles * texture[0] * texture[1] * hold * hold);
+    let mut open: Vec<Open> = cutting.ids().filter(too_long).map(|id| Open { id, cuts: 0, parts: None }).collect();
+    while let Some(Open { id, cuts, parts }) = open.pop() {
         run.progress.check()?;
-        let is_open = |chart: &&Chart| cuts < MOST_CUTS && cost::fill_asks_for_another_cut(most_filled(chart));
-        let Some(chart) = cutting.chart(id).filter(is_open) else { continue };
+        let Some(chart) = cutting.chart(id).filter(|_| cuts < MOST_CUTS) else { continue };
+        let filled = most_filled(chart);
+        let parts = match parts {
+            // As planned, but for where polygons end.
+            Some(1) if !cost::fill_asks_for_another_cut(filled / AS_PLANNED) => continue,
+            Some(parts) if parts > 1 => parts,
+            _ if !cost::fill_asks_for_another_cut(filled) => continue,
+            _ => parts_wanted(&chart.uv, texture, filled_by),
+        };
         let before = hold(&chart.uv, texture);
         // A body that fills a texture fairly is not worth a cut that leaves its parts unequal.
-        let is_empty = cost::fill_asks_for_a_cut(most_filled(chart), 0.0);
-        for place in PLACES.into_iter().take(if is_empty { PLACES.len() } else { 1 }) {
+        let is_empty = cost::fill_asks_for_a_cut(filled, 0.0);
+        let share = (parts / 2) as f64 / parts as f64;
+        let beside = if is_empty { &BESIDE[..] } else { &[] };
+        let places = std::iter::once(None).chain(beside.iter().copied().map(Some));
+        for place in places {
             let Some(chart) = cutting.chart(id) else { break };
-            let Some(proposal) = proposal(&cutting, chart, place, settings, run)? else { continue };
-            if let Verdict::Charts(parts) = trial(&cutting, &proposal, settings, rungs, run)?
-                && cost::fills_better(before, parts.iter().map(|part| hold(&part.uv, texture)))
+            let proposal = match place {
+                None => at_share(&cutting, chart, share, 1.0 / parts as f64, settings, run)?,
+                Some(place) => proposal(&cutting, chart, place, settings, run)?.map(|cut| cut.0),
+            };
+            let Some(proposal) = proposal else { continue };
+            if let Verdict::Charts(made) = trial(&cutting, &proposal, settings, rungs, run)?
+                && cost::fills_better(before, made.iter().map(|part| hold(&part.uv, texture)))
             {
                 rungs.take(Rung::Split);
-                open.extend(cutting.replace(&[id], parts).into_iter().map(|part| (part, cuts + 1)));
+                let planned = place.is_none() && made.len() == 2;
+                // Of two parts the shorter one is that of fewer.
+                let is_shorter = |at: usize| made[at].patch.area() < made[1 - at].patch.area();
+                let of_part = |at: usize| if is_shorter(at) { parts / 2 } else { parts - parts / 2 };
+                let counts: Vec<Option<usize>> = (0..made.len()).map(|at| planned.then(|| of_part(at))).collect();
+                let made = cutting.replace(&[id], made).into_iter().zip(counts);
+                open.extend(made.map(|(id, parts)| Open { id, cuts: cuts + 1, parts }));
             }
         }
     }
     Ok(cutting.into_charts())
+}
+
+/// A chart that may be cut.
+struct Open {
+    id: ChartId,
+    /// Cuts that it came out of.
+    cuts: usize,
+    /// Into how many parts of equal length it is to be cut, if that is known.
+    parts: Option<usize>,
+}
+
+/// Into how many parts of equal length a chart is cut, at least two, so that a texture which holds them can be filled well. `filled_by` says how well one can be that is so many
+/// times as large.
+fn parts_wanted(uv: &[Point2<f64>], texture: [f64; 2], filled_by: impl Fn(f64) -> f64) -> usize {
+    let along = axis(uv);
+    let (low, high) = range(uv, along);
+    let middle = 0.5 * (low + high);
+    let fills = |parts: &usize| {
+        let reach = 0.5 * (high - low) / *parts as f64;
+        let part: Vec<Point2<f64>> =
+            uv.iter().filter(|p| (p.coords.dot(&along) - middle).abs() <= reach).copied().collect();
+        part.is_empty() || !cost::fill_asks_for_another_cut(filled_by(hold(&part, texture)))
+    };
+    (2..=MOST_PARTS).find(fills).unwrap_or(MOST_PARTS)
+}
+
+/// A cut across a chart at some share of its length, near enough for a part of which there are so many, `part` being its share.
+fn at_share(
+    cutting: &Cutting<'_>,
+    chart: &Chart,
+    share: f64,
+    part: f64,
+    settings: &Settings,
+    run: &Run<'_>,
+) -> Result<Option<Proposal>, Cancelled> {
+    let [near, wide] = AROUND.map(|around| [share - around * part, share + around * part]);
+    let Some((anywhere, shortest)) = proposal(cutting, chart, wide, settings, run)? else { return Ok(None) };
+    let right_there = proposal(cutting, chart, near, settings, run)?;
+    let is_short = |cut: &(Proposal, f64)| cut.1 <= (1.0 + LONGER) * shortest;
+    Ok(Some(right_there.filter(is_short).map_or(anywhere, |cut| cut.0)))
 }
 
 /// Share of a chart's boundary where it has been cut open: two sides of the same edge of the surface.
@@ -119,7 +190,7 @@ fn range(uv: &[Point2<f64>], along: Vector2<f64>) -> (f64, f64) {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)))
 }
 
-/// A cut across a chart at some place of its length; `None` where there is none, or where it would be longer than the chart is
+/// A cut across a chart at some place of its length, and how long it is; `None` where there is none, or where it would be longer than the chart is
 /// wide, as it is where no polygon ends there.
 fn proposal(
     cutting: &Cutting<'_>,
@@ -127,7 +198,7 @@ fn proposal(
     place: [f64; 2],
     settings: &Settings,
     run: &Run<'_>,
-) -> Result<Option<Proposal>, Cancelled> {
+) -> Result<Option<(Proposal, f64)>, Cancelled> {
     let (patch, uv) = (&chart.patch, &chart.uv);
     let along = axis(uv);
     let ends = ends(patch, uv, along, place);
@@ -136,11 +207,12 @@ fn proposal(
     let Some(parts) = parts else { return Ok(None) };
     let border = border(&patch.mesh, &parts.label);
     let mean_width = patch.area() / extent(uv, along);
-    if border.iter().map(|&h| patch.mesh.edge_length(h)).sum::<f64>() > MOST_CUT * mean_width {
+    let length: f64 = border.iter().map(|&h| patch.mesh.edge_length(h)).sum();
+    if length > MOST_CUT * mean_width {
         return Ok(None);
     }
     let open: Vec<HalfedgeId> = border.iter().map(|h| patch.faces[h.face().index()].halfedge(h.slot())).collect();
-    Ok(Some(Proposal { edit: Edit::new(cutting.mesh(), &[], &open), start: Start::Lying }))
+    Ok(Some((Proposal { edit: Edit::new(cutting.mesh(), &[], &open), start: Start::Lying }, length)))
 }
 
 /// The faces at either end of a chart, between which it may be cut: those of polygons that lie beyond a place of its length, or reach into it from
@@ -222,6 +294,17 @@ mod tests {
         let (progress, mut rungs) = (Progress::new(), Rungs::default());
         let (settings, run) = (Settings::default(), Run::new(&progress, None));
         cut_across(mesh, polygon, charts, &settings, &mut rungs, &run).expect("not cancelled")
+    }
+
+    #[test]
+    fn parts_are_as_long_as_each_other() {
+        for length in [30, 45, 60, 80] {
+            let parts = cut_up(vec![sheet(length)]);
+            let areas: Vec<f64> = parts.iter().map(|part| part.patch.area()).collect();
+            let (least, most) = areas.iter().fold((f64::MAX, 0.0_f64), |(low, high), &a| (low.min(a), high.max(a)));
+            // Two wide: a cell of the length is two of the area.
+            assert!(parts.len() > 1 && most - least <= 4.0, "{length}: {areas:?}");
+        }
     }
 
     #[test]
