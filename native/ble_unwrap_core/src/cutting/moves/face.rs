@@ -37,7 +37,7 @@ impl Move for Face<'_> {
         MoveKind::Face
     }
 
-    // Two halves were divided for the sake of symmetry, not because they unroll.
+    // Two halves were divided for the sake of symmetry, not because they unroll; and less seam down the middle is worth more than less elsewhere.
     fn price(&self, usual: Price, cutting: &Cutting<'_>, edit: &Edit) -> Price {
         let middle = middle(cutting.mesh(), &self.line(cutting, &edit.charts(cutting)));
         let length = |edges: &[HalfedgeId]| {
@@ -115,7 +115,7 @@ impl Move for Face<'_> {
             });
             let Some(dart) = dart else { break };
             let pair = dart.into_iter().map(of_surface).flat_map(|h| [h, self.mirror.likeness.image(h)]);
-            cut.extend(pair.flat_map(|h| [h, mesh.twin(h)]));
+            cut.extend(pair.filter(|h| !h.is_none()).flat_map(|h| [h, mesh.twin(h)]));
         }
         Ok(ways)
     }
