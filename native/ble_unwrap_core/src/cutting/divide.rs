@@ -40,6 +40,11 @@ impl Refused {
         self.0.contains(&Self::key(faces))
     }
 
+    #[cfg(test)]
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
     /// For faces in ascending order, as patches have them.
     pub(super) fn key(faces: &[FaceId]) -> Fingerprint {
         let mut key = Fingerprint::new();

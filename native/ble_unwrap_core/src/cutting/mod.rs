@@ -292,3 +292,25 @@ fn charts_of(
     };
     run.recall(Kind::TouchedUp, input, bytes, touched)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::test_surfaces::turned;
+    use crate::progress::Progress;
+
+    #[test]
+    fn what_is_finely_divided_comes_apart_at_its_edges_at_once() {
+        // Three cones that meet at 36°, of which no two together unroll, and two caps.
+        let (mesh, polygon) = turned(96, &[[1.0, 0.0], [0.6, 1.0], [0.9, 2.2], [0.5, 3.2]]);
+        let settings = Settings::default();
+        let whole = with_unrolling_parts(Patch::whole(Arc::new(mesh), polygon), &settings);
+        let progress = Progress::new();
+        let run = Run::new(&progress, None);
+        let price = Price::new(&whole.mesh, &settings);
+        let charting = divide(vec![whole], &price, &settings, &|_| (), &run).expect("not cancelled");
+        assert_eq!(charting.charts.len(), 5);
+        assert!(charting.charts.iter().all(|chart| chart.l2 < 1.001));
+        assert_eq!(charting.refused.len(), 1, "only the whole was looked at in vain");
+    }
+}

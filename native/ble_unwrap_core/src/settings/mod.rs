@@ -170,7 +170,7 @@ pub enum Style {
 choices!(Style {
     Auto: "auto", "Auto", "Parts between hard edges that can lie flat without stretch do so if most of a connected piece is made of them, and so do planes and walls between bevels; else only large planes do.";
     Organic: "organic", "Organic", "Hard edges are not treated specially.";
-    Hard: "hard", "Hard Surface", "All parts between hard edges lie flat without stretch, but for thin rings that become strips, whatever the piece is made of; edges count as hard from 40° instead of 50°.";
+    Hard: "hard", "Hard Surface", "All parts between hard edges lie flat without stretch, but for thin rings that become strips, whatever the piece is made of; edges count as hard from 40° instead of 50°, and with either from less on a finely divided surface.";
 });
 
 /// How charts are scaled relative to each other.
