@@ -57,11 +57,19 @@ def test_presets_are_those_of_the_native_module(addon, preset):
     for name in ("threads", *properties.KEPT_BY_PRESETS):
         theirs.pop(name)
     assert set(ours) == set(theirs)
-    # Which way figures look is the host's to know.
-    assert (ours["front"], theirs.pop("front")) == ("-y", "none")
     for name, value in theirs.items():
         expected = pytest.approx(value, rel=1e-6) if isinstance(value, float) else value
         assert ours[name] == expected, name
+
+
+@pytest.mark.parametrize("preset", ["DEFAULT", "PAPER"])
+def test_front_is_told_to_the_native_module_though_nobody_has_set_it(addon, preset):
+    """Which way figures look is the host's to know."""
+    properties, engine = addon("properties"), addon("engine")
+    settings = bpy.context.scene.ble_unwrap
+    settings.preset = preset
+    assert engine.native_settings(properties.values(settings))["front"] == "-y"
+    assert engine.default_settings(preset)["front"] == "none"
 
 
 def test_settings_of_surfaces_are_those_that_clouds_do_not_take(addon):
