@@ -153,6 +153,8 @@ def overlapping_faces(objects):
         try:
             bpy.ops.uv.select_all(action="DESELECT")
             bpy.ops.uv.select_overlap(extend=False)
+            for obj in objects:
+                obj.update_from_editmode()
             return sum(int(uv_selected_faces(obj.data).sum()) for obj in objects)
         finally:
             tools.use_uv_select_sync = before
