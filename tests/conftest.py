@@ -1,9 +1,12 @@
-"""Meshes as plain arrays, for tests that need no Blender. Those that do are in tests/blender, and run in its Python."""
+"""Meshes as plain arrays, for tests that need no Blender.
+
+Those that do are in tests/blender and tests/gui, and run in its Python.
+"""
 
 import numpy as np
 import pytest
 
-collect_ignore = ["blender"]
+collect_ignore = ["blender", "gui"]
 
 
 def grid(columns, rows, height=lambda x, y: 0.0 * x):
