@@ -1,4 +1,4 @@
-//! The middle of a face kept whole: what a cut along the mirror plane would give room to is given it by darts in pairs.
+//! The middle of a face kept whole: darts in pairs make the room that a cut along the mirror plane would make.
 //!
 //! Halves of a mirrored surface meet in the plane, and are joined there as far as they fit. Where the plane runs over a bulge, as it does in a face, they
 //! do not fit, and a cut stays in the middle of it, where everyone looks. So the other way is tried, too: that part of the plane is glued, what can be seen less
